@@ -19,6 +19,8 @@ import { State } from "../model/state.js";
 import { symmetric } from "../model/symmetric.js";
 import { firstView, type View } from "../model/view.js";
 import type { Look, Stage } from "../stage/stage.js";
+import { prepare } from "../io/opened.js";
+import { watchedMesh } from "../link/watched.js";
 import { Asides, type Kept } from "./asides.js";
 import { type Facts, firstFacts, noMesh } from "./facts.js";
 import { Pace } from "./pace.js";
@@ -38,6 +40,7 @@ export class App implements Workbench {
   /** Called after each picture that was drawn. */
   readonly afterDrawing = new Set<(now: number) => void>();
   #seams: Seams | undefined;
+  #watched: string | undefined;
   #mirror: { of: readonly unknown[]; mirror: Mirror } | undefined;
   readonly #asides = new Asides();
   #isBroughtBack = false;
@@ -65,7 +68,7 @@ export class App implements Workbench {
   #needsColours = true;
   #needsMarks = true;
 
-  constructor() {
+  constructor(readonly isWatching = false) {
     this.#panes.add("first");
     this.view.watchAll((view, before) => this.#viewChanged(view, before));
     this.facts.watch(
@@ -153,7 +156,7 @@ export class App implements Workbench {
   #openPanes(): void {
     const { mesh, seams } = this;
     this.adjacency = shownOf(mesh, seams?.faces ?? mesh.faces).adjacency;
-    for (const pane of this.panes) pane.open(mesh, this.document, this.view.now, seams);
+    for (const pane of this.panes) pane.open(mesh, this.document, this.view.now, seams, this.#watched);
     this.#needsMarks = true;
     this.#documentChanged(performance.now());
   }
@@ -180,6 +183,15 @@ export class App implements Workbench {
     });
     this.#openPanes();
     this.fit();
+  }
+
+  /** Shows somebody else's session, for as long as the page is there; only if `isWatching`. Rejects with an LpdeformError. */
+  async watch(session: string): Promise<void> {
+    const mesh = await watchedMesh(session);
+    await prepare(mesh);
+    this.#watched = session;
+    this.open(mesh, emptyDocument);
+    this.view.set({ isYUp: derivedOf(mesh).isYUp });
   }
 
   #present(): Kept {
@@ -483,7 +495,7 @@ export class App implements Workbench {
   #addSecondPane(): boolean {
     try {
       const pane = this.#panes.add("second");
-      if (this.mesh !== noMesh) pane.open(this.mesh, this.document, this.view.now, this.seams);
+      if (this.mesh !== noMesh) pane.open(this.mesh, this.document, this.view.now, this.seams, this.#watched);
       return true;
     } catch {
       this.notify("This browser draws no second picture. Close other pages that draw in three dimensions.", true);
@@ -509,7 +521,7 @@ export class App implements Workbench {
       this.#needsMarks = true;
     }
     if (view.encoding !== before.encoding && this.mesh !== noMesh)
-      for (const pane of this.panes) pane.open(this.mesh, this.document, view, this.seams);
+      for (const pane of this.panes) pane.open(this.mesh, this.document, view, this.seams, this.#watched);
     if (view.isYUp !== before.isYUp) this.fit();
     this.#needsColours = this.#needsMarks = true;
     this.requestDraw();

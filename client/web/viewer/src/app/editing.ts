@@ -64,6 +64,7 @@ export class Editing implements PointingTarget {
 
   press(at: PointerAt): Stroke | undefined {
     this.#readout.hide();
+    if (this.work.isWatching) return undefined;
     switch (this.work.view.now.tool) {
       case "move":
         return this.#pressHandle(at);
@@ -81,7 +82,7 @@ export class Editing implements PointingTarget {
   /** With the move tool, a click on the surface makes a handle; a click beside it clears the selection. */
   click(at: PointerAt): void {
     const { work } = this;
-    if (work.view.now.tool !== "move") return;
+    if (work.view.now.tool !== "move" || work.isWatching) return;
     if (!at.hit) return work.view.set({ selected: undefined });
     this.#select(this.#dabAt(at), at.shift ? "add" : work.view.now.mode);
   }
@@ -102,6 +103,7 @@ export class Editing implements PointingTarget {
   /** A press by key: uses the tool at one place. */
   #workAt(at: PointerAt): boolean {
     const { work } = this;
+    if (work.isWatching) return false;
     if (!at.hit) {
       work.notify("There is no surface under the cross: arrow keys move it.");
       return false;

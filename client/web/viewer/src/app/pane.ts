@@ -76,7 +76,8 @@ export class Pane {
     this.element.append(this.stage.canvas, this.overlay.element);
   }
 
-  open(mesh: Mesh, document: Document, view: View, seams: Seams | undefined): void {
+  /** `watched`: somebody else's session of the mesh. */
+  open(mesh: Mesh, document: Document, view: View, seams: Seams | undefined, watched?: string): void {
     this.live?.close();
     this.#intakeWorker?.stop();
     this.stage.open(mesh, seams?.faces);
@@ -95,7 +96,7 @@ export class Pane {
       notice: (text) => this.watcher.notice(text),
       better: () => this.watcher.better(),
     };
-    this.live = new Live(mesh, document, this.side, view.encoding, watcher, seams?.groups);
+    this.live = new Live(mesh, document, this.side, view.encoding, watcher, seams?.groups, watched);
     this.watcher.better();
     this.#isDirty = true;
   }

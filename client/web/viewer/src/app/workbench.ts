@@ -21,6 +21,9 @@ export interface Workbench {
   /** What is on the other side, if work is done on both. */
   readonly mirror: Mirror | undefined;
 
+  /** Whether it is somebody else's work, which is not changed here. */
+  readonly isWatching: boolean;
+
   /** Makes a step that can be undone. What changes of handles changes on the other side, too, unless it is whole as it is. */
   change(document: Document, isWhole?: boolean): void;
   /** A part of a gesture, from an input at `time`; endGesture() makes a step of all parts. Mirrored like change(). */
