@@ -16,6 +16,7 @@ import type { Reason } from "./reasons.js";
 import { Backoff } from "./recovery.js";
 import { Rpc } from "./rpc.js";
 import { restoreSnapshot, takeSnapshot } from "./snapshot.js";
+import { meshIn } from "./snapshot_mesh.js";
 import { runSolve } from "./solve.js";
 import { frameOptionsToWire } from "./towire.js";
 import type {
@@ -31,6 +32,7 @@ import type {
   Motion,
   Notice,
   OpenOptions,
+  RestMesh,
   RestoreOptions,
   Settings,
   SolveOptions,
@@ -343,6 +345,15 @@ export class Session implements AsyncIterable<Frame> {
     if (isClosed) throw sessionClosed();
     const signal = AbortSignal.any([stop.signal, options.signal].filter((one) => one !== undefined));
     return takeSnapshot(rpc, lease.session, signal);
+  }
+
+  /**
+   * The mesh that the session deforms, at rest, in the order of its frames: for those who have joined it. The server sends a whole
+   * snapshot for that. Rejects with DATA_LOSS (SNAPSHOT_INCOMPLETE, SNAPSHOT_DAMAGED), and SNAPSHOT_NEWER if the server is of a later
+   * version.
+   */
+  async mesh(options: { signal?: AbortSignal } = {}): Promise<RestMesh> {
+    return meshIn(await this.snapshot(options));
   }
 
   /**

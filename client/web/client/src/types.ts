@@ -1,3 +1,11 @@
+/** A mesh as a server has it. */
+export interface RestMesh {
+  /** x, y, z of each vertex. */
+  vertices: Float64Array;
+  /** Three vertex indices of each triangle, counter-clockwise seen from outside. */
+  faces: Uint32Array;
+}
+
 /** A triangle mesh as flat arrays. The order of vertices is never changed. The arrays are kept and must not change. */
 export interface Mesh {
   /** x, y, z of each vertex, in the caller's unit of length. */

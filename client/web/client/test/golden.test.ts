@@ -165,6 +165,8 @@ test("the recorded snapshot, in parts, and what is restored from it", async () =
       yield { offset: BigInt(at), sizeBytes, data: file.subarray(at, at + 500) };
   };
   const taken = await session.snapshot();
+  const mesh = await session.mesh();
+  expect([[...mesh.vertices], [...mesh.faces]]).toEqual([[...strip.vertices], strip.faces]);
   server.on.restore = () => message(RestoreSessionResponseSchema, frames.snapshot.restore_response);
   const restored = await restoreWith(server.rpc(), taken, {});
   opened.push(restored);

@@ -16,13 +16,21 @@ import { sidePanel } from "./ui/sidepanel.js";
 import { startTheme } from "./ui/theme.js";
 import { toolbar } from "./ui/toolbar.js";
 import { topbar } from "./ui/topbar.js";
+import { watchingPage } from "./ui/watching.js";
 
 const root = document.querySelector("#app")!;
 if (canDraw) await start();
 else root.append(noPictures());
 
 async function start(): Promise<void> {
-  const app = new App();
+  const watched = new URLSearchParams(location.search).get("watch");
+  const app = new App(watched !== null);
+  if (watched !== null) {
+    root.append(...watchingPage(app, watched));
+    startTheme(app);
+    exposeForTests(app);
+    return;
+  }
   const files = new Files(app);
   const help = helpSheet(app);
   const dropHere = document.createElement("div");

@@ -186,9 +186,9 @@ describe("a handle file", () => {
       "orientation",
     ]);
     expect(once.paintedP![20]).toBeCloseTo(1.2);
-    const written = writeHandleFile(once, "x");
+    const written = writeHandleFile(once, mesh);
     const again = readHandleFile(written, emptyDocument, mesh);
-    expect(JSON.parse(writeHandleFile(again, "x"))).toEqual(JSON.parse(written));
+    expect(JSON.parse(writeHandleFile(again, mesh))).toEqual(JSON.parse(written));
     const numbers = (json: unknown) =>
       JSON.stringify(json, (_, value: unknown) => (typeof value === "number" ? Number(value.toFixed(9)) : value));
     const { note: _, ...rest } = full;
@@ -204,13 +204,13 @@ describe("a handle file", () => {
 
   it.each(Object.values<HoldKind>(holdKinds))("has the hold “$label” under its key and gives it back", ({ fresh, fileKey }) => {
     const [first, ...others] = document.handles;
-    const written = writeHandleFile({ ...document, handles: [{ ...first!, hold: fresh }, ...others] }, mesh.name);
+    const written = writeHandleFile({ ...document, handles: [{ ...first!, hold: fresh }, ...others] }, mesh);
     if (fileKey) expect(written).toContain(`"${fileKey}":`);
     expect(readHandleFile(written, emptyDocument, mesh).handles[0]!.hold).toEqual(fresh);
   });
 
   it("keeps what the page begins with", () => {
-    const again = readHandleFile(writeHandleFile(document, mesh.name), emptyDocument, mesh);
+    const again = readHandleFile(writeHandleFile(document, mesh), emptyDocument, mesh);
     expect(again.handles.map(({ vertices }) => vertices)).toEqual(document.handles.map(({ vertices }) => vertices));
   });
 

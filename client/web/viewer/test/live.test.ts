@@ -4,7 +4,7 @@ import { EnergyTrail } from "../src/app/energy_trail.js";
 import { Pace } from "../src/app/pace.js";
 import { Meter } from "../src/link/meter.js";
 import { elementsIn, isPassing, statusAtEnd, statusOf } from "../src/link/status.js";
-import { changes, exponent, newSession } from "../src/model/changes.js";
+import { changes as changesOf, exponent, newSession, type Side } from "../src/model/changes.js";
 import {
   addHandle,
   changeHandle,
@@ -18,10 +18,13 @@ import {
   removeHandle,
   withoutPaint,
 } from "../src/model/document.js";
+import { quaternionOf, scaled } from "../src/model/pose.js";
 import { shapeKinds } from "../src/model/shapes.js";
 import { DrawMesh } from "../src/stage/drawmesh.js";
 
 const rest = Float32Array.from({ length: 30 }, (_, k) => k);
+const mesh = { positions: rest, faces: new Uint32Array([0, 1, 2]) };
+const changes = (before: Document, after: Document, side?: Side) => changesOf(before, after, mesh, side);
 const two = addHandle(addHandle(emptyDocument, [0, 1], rest, { name: "a" }), [2, 1, 3], rest, { name: "b" });
 
 describe("the document", () => {
@@ -58,6 +61,23 @@ describe("what the server is told", () => {
     expect(Object.keys(all.handles!)).toEqual(["a", "b"]);
     expect(all.settings).toMatchObject({ p: 1.5 });
     expect(changes(two, two)).toBeUndefined();
+  });
+
+  it("is the places of a handle's vertices and points where it is scaled, but for one that is held by its direction", () => {
+    const [a] = two.handles;
+    const larger = scaled({ ...a!.pose, rotation: quaternionOf([0, 0, 1], Math.PI / 2) }, [2, 3, 1]);
+    const { move } = changes(two, changeHandle(two, "a", { pose: larger }))!.handles!["a"] as {
+      move: { targets: Float64Array };
+    };
+    // Vertices at 0, 1, 2 and 3, 4, 5 about 1.5, 2.5, 3.5: x and y twice and three times as far, then a quarter turn.
+    expect([...move.targets].map((value) => Number(value.toFixed(9)))).toEqual([6, -0.5, 2, -3, 5.5, 5]);
+    const point = { ...a!, vertices: [], points: [{ face: 0, barycentric: [0.5, 0.5, 0] as const }], pose: larger };
+    const set = changes(newSession, { ...two, handles: [point] })!.handles!["a"] as {
+      set: { motion: { targets: Float64Array } };
+    };
+    expect([...set.set.motion.targets].map((value) => Number(value.toFixed(9)))).toEqual([1.5, 2.5, 3.5]);
+    const turned = changeHandle(two, "a", { pose: larger, hold: { kind: "orientation" } });
+    expect((changes(two, turned)!.handles!["a"] as { set: { motion: object } }).set.motion).toHaveProperty("angle");
   });
 
   it("is a move where only the pose changed, and a removal where it is gone", () => {

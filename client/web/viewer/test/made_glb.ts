@@ -1,16 +1,19 @@
 import { boundsOf } from "../src/io/gltf.js";
 import { writeGlb } from "../src/io/gltf_document.js";
 
-const pixel = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg==";
+const pixel = Uint8Array.from(
+  atob("iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="),
+  (letter) => letter.charCodeAt(0),
+);
 
 /** Rows and columns of the tube that makeGlb makes. Its first row is the vertices 0 to columns. */
 export const [rows, columns] = [16, 12];
 
 /**
  * A GLB of a tube along y, of radius 0.5 and height 4, split where its texture begins again, with everything that a primitive can
- * have. Two nodes draw it, at twice the size and mirrored beside that. `isBare`: one node, and nothing but positions.
+ * have. Two nodes draw it, at twice the size and mirrored beside that. `isBare`: one node, and nothing but positions. `picture`: a PNG, its texture.
  */
-export function makeGlb(isBare = false): Uint8Array<ArrayBuffer> {
+export function makeGlb(isBare = false, picture: Uint8Array<ArrayBuffer> = pixel): Uint8Array<ArrayBuffer> {
   const [positions, normals, tangents, texture]: [number[], number[], number[], number[]] = [[], [], [], []];
   const [bend, weights, corners]: [number[], number[], number[]] = [[], [], []];
   for (let row = 0; row <= rows; ++row) {
@@ -72,7 +75,7 @@ export function makeGlb(isBare = false): Uint8Array<ArrayBuffer> {
     };
     const primitive = { attributes, indices: indices(), material: 0, targets: [{ POSITION: floats(bend, 3) }] };
     const [input, output] = [floats([0, 1], 1, "SCALAR"), floats([0, 0, 0, 0, 1, 0], 3)];
-    const image = view(Uint8Array.from(atob(pixel), (letter) => letter.charCodeAt(0)));
+    const image = view(picture);
     json = {
       asset: { version: "2.0", generator: "a test" },
       extensionsUsed: ["KHR_materials_unlit", "ACME_secret"],

@@ -7,7 +7,8 @@ import { readMesh } from "../src/io/read.js";
 import { writeObj } from "../src/io/obj.js";
 import { addHandle, changeHandle, type Document, paint } from "../src/model/document.js";
 import { keyPoseOf } from "../src/model/key_poses.js";
-import { quaternionOf } from "../src/model/pose.js";
+import type { Vector3 } from "../src/model/mesh.js";
+import { apply, quaternionOf, scaled } from "../src/model/pose.js";
 import { shapeKinds } from "../src/model/shapes.js";
 import { firstView } from "../src/model/view.js";
 
@@ -73,6 +74,25 @@ describe("a project", () => {
       wireframe: true,
     });
     expect(from).toEqual(look);
+  });
+
+  it("has the scale of handles and of poses, and their places for the command line", async () => {
+    const { handles } = project.document;
+    const pose = scaled(handles[1]!.pose, [2, 1, 0.5]);
+    const document = changeHandle(project.document, "Top", { pose });
+    const bytes = await writeProject({ ...project, document: { ...document, keyPoses: [keyPoseOf(document)] } });
+    const again = (await read(bytes)).document;
+    expect(again.handles[1]).toEqual(document.handles[1]);
+    expect(again.keyPoses![0]!.handles[1]!.pose).toEqual(pose);
+    const head = JSON.parse(gunzipSync(bytes).toString("latin1").split("\n", 1)[0]!) as Record<string, any>;
+    const [place] = head["handles"].handles[1].positions;
+    const vertex = handles[1]!.vertices[0]!;
+    const at = apply(pose, [...shape.mesh.positions.subarray(3 * vertex, 3 * vertex + 3)] as unknown as Vector3);
+    at.forEach((value, axis) => expect(place[axis]).toBeCloseTo(value, 12));
+    for (const scale of [[0, 1, 1], [1, 1], [1, 1, 1e9], "x"]) {
+      const wrong = (head: Record<string, any>) => (head["marks"][1].pose = { ...pose, scale });
+      await expect(read(await altered(wrong))).rejects.toThrow("the scaled pose of handle “Top” is none");
+    }
   });
 
   it("has doubles, polygons, and an OBJ or GLB file whole", async () => {

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { addHandle, anchorOfHandle, changeHandle, emptyDocument, handleOf } from "../src/model/document.js";
-import { quaternionOf } from "../src/model/pose.js";
+import { quaternionOf, scaled } from "../src/model/pose.js";
 import { posedTogether, selecting, selectionOf, shiftedTogether, toggled } from "../src/model/together.js";
 
 const rest = Float32Array.from([0, 0, 0, 1, 0, 0, 0, 2, 0, 5, 5, 5]);
@@ -64,5 +64,20 @@ describe("several handles", () => {
     expectAt("d", [5, 5, 5]);
     expect(handleOf(turned, "b")!.pose.rotation[2]).toBeCloseTo(Math.SQRT1_2, 12);
     expect(posedTogether(document, [], pose)).toBe(document);
+  });
+
+  it("grow about the first as one body, along its axes; those that are turned by as much as their own axes do", () => {
+    const turned = changeHandle(document, "b", { pose: { ...all[1]!.pose, rotation: quaternionOf([0, 0, 1], Math.PI / 2) } });
+    const pose = scaled(all[0]!.pose, [3, 2, 1]);
+    const grown = posedTogether(turned, turned.handles.slice(0, 3), pose);
+    expect([anchor(grown, "b"), anchor(grown, "c")]).toEqual([
+      [3, 0, 0],
+      [0, 4, 0],
+    ]);
+    const scaleOf = (name: string) => handleOf(grown, name)!.pose.scale?.map((value) => Number(value.toFixed(12)));
+    expect([scaleOf("a"), scaleOf("b"), scaleOf("c"), scaleOf("d")]).toEqual([[3, 2, 1], [2, 3, 1], [3, 2, 1], undefined]);
+    const back = posedTogether(grown, grown.handles.slice(0, 3), all[0]!.pose);
+    expect(anchor(back, "c").map((value) => value + 0)).toEqual([0, 2, 0]);
+    expect(handleOf(back, "c")!.pose.scale).toBeUndefined();
   });
 });

@@ -9,14 +9,18 @@ import { History, type Steps } from "../model/history.js";
 import { keyPoseOf } from "../model/key_poses.js";
 import { kindOf } from "../model/hold_kinds.js";
 import type { Mesh } from "../model/mesh.js";
+import { Mirror, mirrorAxes, type Symmetry } from "../model/mirror.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
 import type { Seams } from "../model/seams.js";
 import { nothing } from "../model/pointed.js";
 import { subtract } from "../model/pose.js";
 import { gridStep } from "../model/snap.js";
 import { State } from "../model/state.js";
+import { symmetric } from "../model/symmetric.js";
 import { firstView, type View } from "../model/view.js";
 import type { Look, Stage } from "../stage/stage.js";
+import { prepare } from "../io/opened.js";
+import { watchedMesh } from "../link/watched.js";
 import { Asides, type Kept } from "./asides.js";
 import { type Facts, firstFacts, noMesh } from "./facts.js";
 import { Pace } from "./pace.js";
@@ -36,6 +40,8 @@ export class App implements Workbench {
   /** Called after each picture that was drawn. */
   readonly afterDrawing = new Set<(now: number) => void>();
   #seams: Seams | undefined;
+  #watched: string | undefined;
+  #mirror: { of: readonly unknown[]; mirror: Mirror } | undefined;
   readonly #asides = new Asides();
   #isBroughtBack = false;
   #isKeyHeld = false;
@@ -52,13 +58,17 @@ export class App implements Workbench {
       problem: (problem) => this.facts.set({ problem }),
       notice: (text) => this.notify(text),
       better: () => this.#showBetter(),
+      dressed: () => {
+        this.#needsColours = true;
+        this.requestDraw();
+      },
     },
     (pane) => this.#edit(pane),
   );
   #needsColours = true;
   #needsMarks = true;
 
-  constructor() {
+  constructor(readonly isWatching = false) {
     this.#panes.add("first");
     this.view.watchAll((view, before) => this.#viewChanged(view, before));
     this.facts.watch(
@@ -146,7 +156,7 @@ export class App implements Workbench {
   #openPanes(): void {
     const { mesh, seams } = this;
     this.adjacency = shownOf(mesh, seams?.faces ?? mesh.faces).adjacency;
-    for (const pane of this.panes) pane.open(mesh, this.document, this.view.now, seams);
+    for (const pane of this.panes) pane.open(mesh, this.document, this.view.now, seams, this.#watched);
     this.#needsMarks = true;
     this.#documentChanged(performance.now());
   }
@@ -173,6 +183,15 @@ export class App implements Workbench {
     });
     this.#openPanes();
     this.fit();
+  }
+
+  /** Shows somebody else's session, for as long as the page is there; only if `isWatching`. Rejects with an LpdeformError. */
+  async watch(session: string): Promise<void> {
+    const mesh = await watchedMesh(session);
+    await prepare(mesh);
+    this.#watched = session;
+    this.open(mesh, emptyDocument);
+    this.view.set({ isYUp: derivedOf(mesh).isYUp });
   }
 
   #present(): Kept {
@@ -232,16 +251,44 @@ export class App implements Workbench {
     this.facts.set({ setAside: this.#asides.names });
   }
 
-  /** Makes a step that can be undone. */
-  change(document: Document): void {
-    this.history.push(document);
+  change(document: Document, isWhole = false): void {
+    this.history.push(isWhole ? document : this.#symmetric(document));
     this.#documentChanged(performance.now());
   }
 
-  /** A part of a gesture, from an input at `time`; endGesture() makes a step of all parts. */
-  during(document: Document, time: number): void {
-    this.history.during(document);
+  during(document: Document, time: number, isWhole = false): void {
+    this.history.during(isWhole ? document : this.#symmetric(document));
     this.#documentChanged(time);
+  }
+
+  /** Whether the file of the mesh has materials that are shown. */
+  get isTextured(): boolean {
+    return this.mesh.gltf !== undefined && this.mesh.beside?.includes("materials") === true;
+  }
+
+  get mirror(): Mirror | undefined {
+    const { symmetry } = this.view.now;
+    if (symmetry === "none" || this.mesh === noMesh) return undefined;
+    const { mesh, adjacency, edge } = this;
+    const of = [mesh, adjacency, symmetry] as const;
+    if (!this.#mirror?.of.every((one, k) => one === of[k])) {
+      const { bounds } = derivedOf(mesh);
+      this.#mirror = { of, mirror: new Mirror(mesh, bounds, mirrorAxes[symmetry], edge || this.diagonal, adjacency) };
+    }
+    return this.#mirror.mirror;
+  }
+
+  /** Leading are the handles that are selected. */
+  #symmetric(document: Document): Document {
+    const { mirror } = this;
+    const { selected, alsoSelected } = this.view.now;
+    return mirror ? symmetric(this.document, document, mirror, [selected ?? "", ...alsoSelected]) : document;
+  }
+
+  /** What is not symmetric yet stays as it is until it is worked on. */
+  setSymmetry(symmetry: Symmetry): void {
+    this.view.set({ symmetry });
+    if (symmetry !== "none") this.notify(`What is done on one side of the plane across ${symmetry} is done on the other.`);
   }
 
   endGesture(): void {
@@ -439,6 +486,7 @@ export class App implements Workbench {
     const step = snapping === "grid" ? gridStep(this.diagonal) : undefined;
     for (const pane of this.panes) {
       pane.mark(document, this.view.now, pointedOut, colour);
+      pane.stage.plane.show(this.mirror?.axis, derivedOf(this.mesh).bounds);
       pane.stage.gizmo.show(pose, handle && kindOf(handle.hold).isTurnedOnly ? "rotate" : gizmo, axes, step);
     }
   }
@@ -447,7 +495,7 @@ export class App implements Workbench {
   #addSecondPane(): boolean {
     try {
       const pane = this.#panes.add("second");
-      if (this.mesh !== noMesh) pane.open(this.mesh, this.document, this.view.now, this.seams);
+      if (this.mesh !== noMesh) pane.open(this.mesh, this.document, this.view.now, this.seams, this.#watched);
       return true;
     } catch {
       this.notify("This browser draws no second picture. Close other pages that draw in three dimensions.", true);
@@ -473,7 +521,7 @@ export class App implements Workbench {
       this.#needsMarks = true;
     }
     if (view.encoding !== before.encoding && this.mesh !== noMesh)
-      for (const pane of this.panes) pane.open(this.mesh, this.document, view, this.seams);
+      for (const pane of this.panes) pane.open(this.mesh, this.document, view, this.seams, this.#watched);
     if (view.isYUp !== before.isYUp) this.fit();
     this.#needsColours = this.#needsMarks = true;
     this.requestDraw();

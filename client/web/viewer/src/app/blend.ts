@@ -1,6 +1,6 @@
 import type { LpdeformError } from "lpdeform-client";
 import { sentence } from "../link/status.js";
-import { shapesAt } from "../link/prepare.js";
+import { shapesOf } from "../link/prepare.js";
 import { type Blended, blended, blendPs, type Shape } from "../model/blend.js";
 import type { Document } from "../model/document.js";
 import { State } from "../model/state.js";
@@ -79,9 +79,11 @@ export class Blend {
     }
     const { signal } = (this.#run = new AbortController());
     try {
-      for await (const [p, shape] of shapesAt(mesh, document, blendPs, seams?.groups, signal)) {
+      const documents = blendPs.map((p) => ({ ...document, p }));
+      let next = 0;
+      for await (const shape of shapesOf(mesh, documents, seams?.groups, signal)) {
         if (signal.aborted) return;
-        this.#shapes.set(p, shape);
+        this.#shapes.set(blendPs[next++]!, shape);
         this.facts.set({ ready: this.#shapes.size });
       }
     } catch (thrown) {

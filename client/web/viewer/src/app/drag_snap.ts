@@ -63,7 +63,7 @@ export class DragSnap {
     }
     const normals = vertexNormals(places, work.mesh.faces);
     const all = Array.from({ length: places.length / 3 }, (_, vertex) => vertex);
-    const wanted = new Set(facing(all, places, normals, stage.camera.position.toArray()));
+    const wanted = new Set(facing(all, places, normals, stage.eye));
     for (const vertex of handle.vertices) wanted.delete(vertex);
     return places.map((value, k) => (wanted.has(Math.floor(k / 3)) ? value : NaN));
   }

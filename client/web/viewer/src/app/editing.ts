@@ -1,5 +1,6 @@
-import { addHandle, extendHandle, type Handle, handleOf, ownersOf, releaseVertices } from "../model/document.js";
+import { addHandle, type Document, extendHandle, type Handle, handleOf, ownersOf, releaseVertices } from "../model/document.js";
 import { isAtRest, type Vector3 } from "../model/mesh.js";
+import { partnerOf } from "../model/symmetric.js";
 import { nothing, ofVertices } from "../model/pointed.js";
 import { follow, placesOf } from "../model/places.js";
 import { add, type Pose, subtract } from "../model/pose.js";
@@ -63,6 +64,7 @@ export class Editing implements PointingTarget {
 
   press(at: PointerAt): Stroke | undefined {
     this.#readout.hide();
+    if (this.work.isWatching) return undefined;
     switch (this.work.view.now.tool) {
       case "move":
         return this.#pressHandle(at);
@@ -80,7 +82,7 @@ export class Editing implements PointingTarget {
   /** With the move tool, a click on the surface makes a handle; a click beside it clears the selection. */
   click(at: PointerAt): void {
     const { work } = this;
-    if (work.view.now.tool !== "move") return;
+    if (work.view.now.tool !== "move" || work.isWatching) return;
     if (!at.hit) return work.view.set({ selected: undefined });
     this.#select(this.#dabAt(at), at.shift ? "add" : work.view.now.mode);
   }
@@ -89,18 +91,19 @@ export class Editing implements PointingTarget {
     this.#readout.point(at);
     const { tool } = this.work.view.now;
     if (tool !== "brush" && tool !== "paint") return;
-    this.work.facts.set({ pointedOut: at?.hit ? ofVertices(this.#dabAt(at)) : nothing });
+    this.work.facts.set({ pointedOut: at?.hit ? ofVertices(this.#onBothSides(this.#dabAt(at))) : nothing });
   }
 
   #hoverByKey(event: PointerEvent | undefined): void {
     const at = event && this.#pointing.at(event);
-    this.work.facts.set({ pointedOut: at?.hit ? ofVertices(this.#dabAt(at)) : nothing });
+    this.work.facts.set({ pointedOut: at?.hit ? ofVertices(this.#onBothSides(this.#dabAt(at))) : nothing });
     this.#readout.point(at, true);
   }
 
   /** A press by key: uses the tool at one place. */
   #workAt(at: PointerAt): boolean {
     const { work } = this;
+    if (work.isWatching) return false;
     if (!at.hit) {
       work.notify("There is no surface under the cross: arrow keys move it.");
       return false;
@@ -132,6 +135,15 @@ export class Editing implements PointingTarget {
   /** Adds the copies of each vertex, because they belong together. */
   #withCopies(vertices: number[]): number[] {
     return this.work.seams?.withCopies(vertices) ?? vertices;
+  }
+
+  #imageOf(vertices: readonly number[]): number[] {
+    const { mirror } = this.work;
+    return mirror ? this.#withCopies([...mirror.imagesOf(vertices).keys()]) : [];
+  }
+
+  #onBothSides(vertices: readonly number[]): readonly number[] {
+    return this.work.mirror ? [...new Set([...vertices, ...this.#imageOf(vertices)])] : vertices;
   }
 
   #pressHandle(at: PointerAt): Stroke | undefined {
@@ -209,7 +221,7 @@ export class Editing implements PointingTarget {
     const touch = (at: PointerAt) => {
       if (!at.hit) return;
       for (const vertex of this.#dabAt(at)) touched.add(vertex);
-      work.facts.set({ pointedOut: ofVertices([...touched]) });
+      work.facts.set({ pointedOut: ofVertices(this.#onBothSides([...touched])) });
     };
     touch(start);
     return {
@@ -250,7 +262,7 @@ export class Editing implements PointingTarget {
     const inside = insidePolygon(project(positions, viewProjection(stage), stage.width, stage.height), polygon);
     if (this.work.view.now.isThrough) return this.#withCopies(inside);
     const normals = vertexNormals(positions, mesh.faces);
-    return this.#withCopies(facing(inside, positions, normals, stage.camera.position.toArray()));
+    return this.#withCopies(facing(inside, positions, normals, stage.eye));
   }
 
   #select(vertices: readonly number[], mode: "new" | "add" | "release"): void {
@@ -258,14 +270,32 @@ export class Editing implements PointingTarget {
     const rest = work.mesh.positions;
     const before = work.document;
     const { selected } = work.view.now;
-    if (mode === "release") return work.change(releaseVertices(before, vertices, rest));
-    if (mode === "add" && handleOf(before, selected)) return work.change(extendHandle(before, selected!, vertices, rest));
+    if (mode === "release") return work.change(releaseVertices(before, this.#onBothSides(vertices), rest), true);
+    const handle = handleOf(before, selected);
+    if (mode === "add" && handle) return work.change(this.#extended(handle, vertices), true);
+    const image = this.#imageOf(vertices);
+    const isOnPlane = image.some((vertex) => vertices.includes(vertex));
+    const after = this.#added(before, isOnPlane ? this.#onBothSides(vertices) : vertices);
+    if (after === before) return work.notify("Another handle holds these vertices already.");
+    work.change(isOnPlane ? after : this.#added(after, image), true);
+    work.view.set({ selected: after.handles.at(-1)!.name });
+  }
+
+  #added(before: Document, vertices: readonly number[]): Document {
+    const rest = this.work.mesh.positions;
     const { positions } = this.pane.stage.surface!;
     const current = isAtRest(positions, rest, vertices) ? rest : positions; // ignores differences that are only the rounding of frames
-    const after = addHandle(before, vertices, rest, {}, current);
-    if (after === before) return work.notify("Another handle holds these vertices already.");
-    work.change(after);
-    work.view.set({ selected: after.handles.at(-1)!.name });
+    return addHandle(before, vertices, rest, {}, current);
+  }
+
+  /** A handle on the plane of symmetry grows on both sides; another one grows on its own, and its partner on the other. */
+  #extended(handle: Handle, vertices: readonly number[]): Document {
+    const { document, mirror, mesh } = this.work;
+    const partner = mirror && partnerOf(document.handles, handle, mirror);
+    const own = partner === handle ? this.#onBothSides(vertices) : vertices;
+    const grown = extendHandle(document, handle.name, own, mesh.positions);
+    if (!partner || partner === handle) return grown;
+    return extendHandle(grown, partner.name, this.#imageOf(vertices), mesh.positions);
   }
 }
 

@@ -172,11 +172,23 @@ export class Files {
     this.app.notify(`${file.name}: “${this.app.mesh.name}” with ${count === 1 ? "a handle" : `${count} handles`}.`);
   }
 
+  async exportPoses(as: "glb" | "video"): Promise<void> {
+    const { posesAsGlb, posesAsVideo } = await import("./filming.js");
+    try {
+      const content = as === "glb" ? await posesAsGlb(this.app) : await posesAsVideo(this.app);
+      if (content instanceof Blob)
+        save(`${this.#stem}-poses.${content.type.startsWith("video/mp4") ? "mp4" : "webm"}`, content);
+      else if (content) save(`${this.#stem}-poses.glb`, content);
+    } catch (thrown) {
+      this.app.notify(`The poses were not exported. ${sentence((thrown as Error).message)}`, true);
+    }
+  }
+
   saveHandles(): void {
     if (this.app.document.handles.length === 0) {
       return this.app.notify("There are no handles to save: click the surface to place one.", true);
     }
-    save(`${this.#stem}-handles.json`, writeHandleFile(this.app.document, this.app.mesh.name));
+    save(`${this.#stem}-handles.json`, writeHandleFile(this.app.document, this.app.mesh));
   }
 
   get #stem(): string {
@@ -199,7 +211,10 @@ export class Files {
   #openHandles(name: string, text: string): void {
     const { app } = this;
     const { seams } = app;
-    app.change(readHandleFile(text, app.document, app.mesh, (vertices) => seams?.withCopies(vertices) ?? vertices));
+    app.change(
+      readHandleFile(text, app.document, app.mesh, (vertices) => seams?.withCopies(vertices) ?? vertices),
+      true,
+    );
     app.view.set({ selected: app.document.handles.at(-1)!.name });
     app.notify(`${name}: ${app.document.handles.length} handles.`);
   }

@@ -29,13 +29,18 @@ export class PaintStroke implements Stroke {
     if (!at.hit) return;
     const { work } = this;
     const dab = this.dabAt(at);
-    for (const vertex of dab) {
-      const strength = this.#strengthOf(vertex, at.hit.point);
+    const { adjacency, seams, mirror } = work;
+    const strengths = new Map(dab.map((vertex) => [vertex, this.#strengthOf(vertex, at.hit!.point)]));
+    for (const [image, vertex] of mirror?.imagesOf(dab) ?? []) {
+      for (const copy of seams?.withCopies([image]) ?? [image]) {
+        strengths.set(copy, Math.max(strengths.get(vertex)!, strengths.get(copy) ?? 0));
+      }
+    }
+    for (const [vertex, strength] of strengths) {
       if (strength > (this.#strengths.get(vertex) ?? 0)) this.#strengths.set(vertex, strength);
     }
-    work.facts.set({ pointedOut: ofVertices(dab) });
+    work.facts.set({ pointedOut: ofVertices([...strengths.keys()]) });
     const count = work.mesh.positions.length / 3;
-    const { adjacency, seams } = work;
     work.during(paintSoftly(this.#before, this.#strengths, this.#brush, count, adjacency, seams?.groups), at.time);
   }
 

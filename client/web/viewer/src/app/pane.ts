@@ -29,6 +29,8 @@ export interface PaneWatcher {
   problem(error: LpdeformError): void;
   notice(text: string): void;
   better(): void;
+  /** There are textures to be shown. */
+  dressed(): void;
 }
 
 /** A handle that is ahead of the frame, and how far vertices go along with it, once that is known. */
@@ -60,6 +62,7 @@ export class Pane {
   /** Shown in place of the frames. */
   #preview: Shape | undefined;
   #endsWithFrame = false;
+  #dressed: Surface | undefined;
 
   constructor(
     readonly side: Side,
@@ -73,7 +76,8 @@ export class Pane {
     this.element.append(this.stage.canvas, this.overlay.element);
   }
 
-  open(mesh: Mesh, document: Document, view: View, seams: Seams | undefined): void {
+  /** `watched`: somebody else's session of the mesh. */
+  open(mesh: Mesh, document: Document, view: View, seams: Seams | undefined, watched?: string): void {
     this.live?.close();
     this.#intakeWorker?.stop();
     this.stage.open(mesh, seams?.faces);
@@ -92,7 +96,7 @@ export class Pane {
       notice: (text) => this.watcher.notice(text),
       better: () => this.watcher.better(),
     };
-    this.live = new Live(mesh, document, this.side, view.encoding, watcher, seams?.groups);
+    this.live = new Live(mesh, document, this.side, view.encoding, watcher, seams?.groups, watched);
     this.watcher.better();
     this.#isDirty = true;
   }
@@ -189,12 +193,36 @@ export class Pane {
   colour(document: Document, view: View, red: number): void {
     const { surface } = this.stage;
     if (!surface) return;
+    if (view.colourBy === "texture") void this.#dress(surface);
     const p = this.side === "first" ? document.p : document.secondP;
     const [values, scale] = coloured(document, view, p, this.distortion, red);
     surface.colour(view.colourBy, values, scale);
     surface.show(view);
     this.stage.darken(view.isDark);
+    this.stage.drawParallel(view.isParallel);
     this.#isDirty = true;
+  }
+
+  /** Once, when its texture is first wanted. */
+  async #dress(surface: Surface): Promise<void> {
+    const { name, gltf } = surface.mesh;
+    if (this.#dressed === surface || !gltf) return;
+    this.#dressed = surface;
+    try {
+      const [{ readGltfTextures }, { decoded, Textured }] = await Promise.all([
+        import("../io/gltf_textures.js"),
+        import("../stage/textured.js"),
+      ]);
+      const texturing = readGltfTextures(name, gltf);
+      const images = await decoded(texturing.layers);
+      if (this.stage.surface !== surface) return;
+      const missing = texturing.layers.filter(({ image }, k) => image && !images[k]).length;
+      if (missing > 0) this.watcher.notice(`${missing} textures of ${name} are images that this browser does not show.`);
+      surface.dress((indices, makeMaterial) => new Textured({ indices }, texturing, images, makeMaterial));
+      this.watcher.dressed();
+    } catch (thrown) {
+      this.watcher.notice(`The textures of ${name} cannot be shown: ${(thrown as Error).message}`);
+    }
   }
 
   mark(document: Document, view: View, pointedOut: PointedOut, colour: string): void {

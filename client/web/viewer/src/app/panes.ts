@@ -95,7 +95,11 @@ export class Panes {
     for (const pane of this.all) {
       pane.live?.show(work, time);
       const p = pane.side === "first" ? work.p : work.secondP;
-      pane.element.dataset["label"] = work.isAutomatic ? "p from the shape" : `p = ${p}`;
+      pane.element.dataset["label"] = pane.live?.watched
+        ? "as it is shared"
+        : work.isAutomatic
+          ? "p from the shape"
+          : `p = ${p}`;
     }
     this.#nameAll();
   }

@@ -3,7 +3,8 @@ import type { Document } from "../model/document.js";
 import { State } from "../model/state.js";
 import type { App } from "./app.js";
 
-const secondsEach = 1.5;
+/** From one pose to the next. */
+export const secondsEach = 1.5;
 /** However slowly the page draws, what lies between two poses is seen. */
 const mostSecondsAtOnce = 0.1;
 
@@ -49,7 +50,7 @@ export class Player {
   }
 
   #show(document: Document, time: number): void {
-    this.app.during(document, time);
+    this.app.during(document, time, true);
     this.#shown = document;
   }
 

@@ -49,7 +49,8 @@ export class Readout {
     const at = this.#vertex;
     if (at === undefined) return;
     const { p, secondP } = work.document;
-    const text = readingOf(work.document, pane.side === "first" ? p : secondP, pane.frame?.distortion[at], at);
+    const own = pane.side === "first" ? p : secondP;
+    const text = readingOf(work.document, work.isWatching ? undefined : own, pane.frame?.distortion[at], at);
     if (this.#element.textContent !== text) this.#element.textContent = text;
   }
 

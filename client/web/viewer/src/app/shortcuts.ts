@@ -1,16 +1,18 @@
 import { changeHandle, handleOf, removeHandle } from "../model/document.js";
 import { steppedP } from "../model/exponent.js";
-import { gridStep, type Snapping, turnStep } from "../model/snap.js";
-import { turned } from "../model/pose.js";
+import { kindOf } from "../model/hold_kinds.js";
+import type { Symmetry } from "../model/mirror.js";
+import { gridStep, scaleStep, type Snapping, turnStep } from "../model/snap.js";
+import { noScale, scaled, turned } from "../model/pose.js";
 import type { PaintMode } from "../model/soft_paint.js";
 import { posedTogether, selectionOf, shiftedTogether } from "../model/together.js";
-import type { ColourBy, GizmoAxes, Tool } from "../model/view.js";
+import { colourings, type GizmoAxes, type Tool } from "../model/view.js";
 import type { App } from "./app.js";
 import type { Files } from "./files.js";
 
 const tools: readonly Tool[] = ["move", "brush", "lasso", "box", "paint"];
-const colours: readonly ColourBy[] = ["distortion", "p", "stiffness", "normals", "plain"];
 const snappings: readonly Snapping[] = ["none", "grid", "vertices"];
+const symmetries: readonly Symmetry[] = ["none", "x", "y", "z"];
 const paintModes: readonly PaintMode[] = ["set", "erase", "smooth"];
 const allAxes: readonly GizmoAxes[] = ["world", "local", "view"];
 const nudges: Record<string, readonly [number, number, number]> = {
@@ -36,6 +38,7 @@ const turnRadians = Math.PI / 24;
 /** Share of the mesh's diagonal, or of a turn about an axis; a tenth of it with Shift. */
 const nudgeShare = 0.01;
 const nudgeRadians = Math.PI / 60;
+const nudgeFactor = 0.05;
 /** Share of the picture's height. */
 const shiftShare = 0.05;
 
@@ -104,7 +107,13 @@ function actions(app: App, files: Files, help: HTMLDialogElement, event: Keyboar
     ".": () => stepP(0.1),
     a: () => app.change({ ...app.document, isAutomatic: !app.document.isAutomatic }),
     b: () => app.lookAlongNext(),
-    c: () => view.set({ colourBy: after(colours, now.colourBy) }),
+    c: () =>
+      view.set({
+        colourBy: after(
+          colourings.filter((one) => one !== "texture" || app.isTextured),
+          now.colourBy,
+        ),
+      }),
     d: () => view.set({ isDark: !now.isDark }),
     f: () => app.fit(),
     g: () => view.set({ ghost: !now.ghost }),
@@ -116,11 +125,14 @@ function actions(app: App, files: Files, help: HTMLDialogElement, event: Keyboar
     o: () => files.choose(),
     p: () => app.togglePin(),
     r: () => view.set({ gizmo: "rotate", tool: "move" }),
+    q: () => view.set({ isParallel: !now.isParallel }),
     s: () => view.set({ isSplit: !now.isSplit }),
     t: () => view.set({ gizmo: "translate", tool: "move" }),
+    z: () => view.set({ gizmo: "scale", tool: "move" }),
     x: () => view.set({ axes: after(allAxes, now.axes) }),
     e: () => view.set({ paintMode: now.tool === "paint" ? after(paintModes, now.paintMode) : now.paintMode, tool: "paint" }),
     v: () => view.set({ hasReadout: !now.hasReadout }),
+    y: () => app.setSymmetry(after(symmetries, now.symmetry)),
     w: () => view.set({ wireframe: !now.wireframe }),
     Delete: () => removeSelected(app),
     Backspace: () => removeSelected(app),
@@ -166,8 +178,8 @@ function selectNext(app: App): void {
 }
 
 /**
- * Moves along the mesh's axes by a hundredth of its diagonal; rotates by three degrees if the handle has rings. On a grid, by its
- * steps.
+ * Moves along the mesh's axes by a hundredth of its diagonal; rotates by three degrees if the handle has rings; scales by a
+ * twentieth if it has cubes. On a grid, by its steps.
  */
 function nudge(app: App, direction: readonly [number, number, number], event: KeyboardEvent): boolean {
   const selection = selectionOf(app.document, app.view.now);
@@ -176,10 +188,15 @@ function nudge(app: App, direction: readonly [number, number, number], event: Ke
   const isOnGrid = app.view.now.snapping === "grid";
   const share = event.shiftKey && !isOnGrid ? 0.1 : 1;
   const isTurn = app.view.now.gizmo === "rotate" && !handle.isLocked;
-  if (isTurn && !handle.targets) {
+  const isScale = app.view.now.gizmo === "scale" && !handle.isLocked && !kindOf(handle.hold).isTurnedOnly;
+  if (isScale && !handle.targets) {
+    const by = isOnGrid ? scaleStep : share * nudgeFactor;
+    const scale = (handle.pose.scale ?? noScale).map((value, k) => value + by * direction[k]!) as [number, number, number];
+    app.byKey(posedTogether(app.document, selection, scaled(handle.pose, scale)), event);
+  } else if (isTurn && !handle.targets) {
     const pose = turned(handle.pose, direction, isOnGrid ? (turnStep * Math.PI) / 180 : share * nudgeRadians);
     app.byKey(posedTogether(app.document, selection, pose), event);
-  } else if (!isTurn && app.canShift(handle)) {
+  } else if (!isTurn && !isScale && app.canShift(handle)) {
     const step = isOnGrid ? gridStep(app.diagonal) : share * nudgeShare * app.diagonal;
     const [x, y, z] = direction;
     app.byKey(shiftedTogether(app.document, selection, [step * x, step * y, step * z]), event);

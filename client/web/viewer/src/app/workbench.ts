@@ -1,6 +1,7 @@
 import type { Adjacency } from "../model/adjacency.js";
 import type { Document, Handle } from "../model/document.js";
 import type { Mesh } from "../model/mesh.js";
+import type { Mirror } from "../model/mirror.js";
 import type { Seams } from "../model/seams.js";
 import type { State } from "../model/state.js";
 import type { View } from "../model/view.js";
@@ -17,11 +18,16 @@ export interface Workbench {
   readonly seams: Seams | undefined;
   /** Of the mesh's bounding box. */
   readonly diagonal: number;
+  /** What is on the other side, if work is done on both. */
+  readonly mirror: Mirror | undefined;
 
-  /** Makes a step that can be undone. */
-  change(document: Document): void;
-  /** A part of a gesture, from an input at `time`; endGesture() makes a step of all parts. */
-  during(document: Document, time: number): void;
+  /** Whether it is somebody else's work, which is not changed here. */
+  readonly isWatching: boolean;
+
+  /** Makes a step that can be undone. What changes of handles changes on the other side, too, unless it is whole as it is. */
+  change(document: Document, isWhole?: boolean): void;
+  /** A part of a gesture, from an input at `time`; endGesture() makes a step of all parts. Mirrored like change(). */
+  during(document: Document, time: number, isWhole?: boolean): void;
   endGesture(): void;
   /** Reverts what the present gesture has changed, without a step. False if there is no gesture. */
   cancelGesture(): boolean;

@@ -23,8 +23,18 @@ export interface DrawList {
   vertexCount: number;
   /** Three vertices of all blocks each. */
   faces: number[];
+  /** Which primitive the faces are of, in their order. */
+  parts: DrawPart[];
   /** What is drawn otherwise, in words. */
   left: Set<string>;
+}
+
+/** The faces of one primitive. */
+export interface DrawPart {
+  block: Block;
+  primitive: number;
+  firstFace: number;
+  faceCount: number;
 }
 
 const [triangles, strip, fan] = [4, 5, 6];
@@ -42,7 +52,7 @@ export function readBlocks(document: GltfDocument): DrawList {
     const name = Object.keys(partOf(view["extensions"])).find((key) => key.endsWith("_meshopt_compression"));
     if (name) refuse(nameOf(json, "bufferViews", k), `is compressed by ${name}, which is not read`);
   });
-  const list: DrawList = { blocks: [], vertexCount: 0, faces: [], left: new Set() };
+  const list: DrawList = { blocks: [], vertexCount: 0, faces: [], parts: [], left: new Set() };
   const worlds = nodesOf(json);
   for (const node of worlds.keys()) {
     if (listOf(json, "nodes")[node]!["mesh"] !== undefined) readNode(document, node, worlds, list);
@@ -156,7 +166,9 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Matr
       list.vertexCount += count;
       if (list.vertexCount > most) refuse("the scene", `has more than ${most} vertices, which this page takes at most`);
     }
+    const firstFace = list.faces.length / 3;
     addTriangles(cornersOf(document, primitive, block.count, part), mode, block, list);
+    list.parts.push({ block, primitive: k, firstFace, faceCount: list.faces.length / 3 - firstFace });
   });
   list.blocks.push(...own);
 }

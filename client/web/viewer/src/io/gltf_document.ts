@@ -124,7 +124,7 @@ export function appendView(document: GltfDocument, bytes: Uint8Array, target?: n
 const isData = (uri: unknown) => typeof uri === "string" && uri.startsWith("data:");
 
 /** The bytes of a data URI, or of a file that was opened together with the glTF. */
-function bytesAt(uri: unknown, beside: ReadonlyMap<string, Uint8Array>): Uint8Array | undefined {
+export function bytesAt(uri: unknown, beside: ReadonlyMap<string, Uint8Array>): Uint8Array | undefined {
   if (typeof uri !== "string") return undefined;
   if (!isData(uri)) return beside.get(decoded(uri).split("/").at(-1)!);
   const text = /^data:[^,]*;base64,/.exec(uri);

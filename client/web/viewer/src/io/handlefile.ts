@@ -2,6 +2,7 @@ import type { Hold, SurfacePoint } from "lpdeform-client";
 import { addHandle, type Document, type Handle, paint, withoutPaint } from "../model/document.js";
 import { type HoldKind, holdKinds, kindOf } from "../model/hold_kinds.js";
 import { centroid, type Mesh, type Vector3 } from "../model/mesh.js";
+import { targetsOf } from "../model/targets.js";
 import { capital } from "../model/words.js";
 import { axisAngle, isAtRest, noRotation, type Pose, quaternionOf } from "../model/pose.js";
 import { FileFault } from "./fault.js";
@@ -183,23 +184,25 @@ function withGroup(
   return result;
 }
 
-/** A handle file with the document's handles, and its painting as groups. */
-export function writeHandleFile(document: Document, meshName: string): string {
-  return `${JSON.stringify(handlesJson(document, meshName))}\n`;
+/** A handle file with the document's handles, and its painting as groups. A scaled handle has positions in it. */
+export function writeHandleFile(document: Document, mesh: Mesh): string {
+  return `${JSON.stringify(handlesJson(document, mesh))}\n`;
 }
 
 /** The JSON of such a file. */
-export function handlesJson(document: Document, meshName: string): object {
+export function handlesJson(document: Document, mesh: Mesh): object {
   const groups = [...paintedGroups("p", document.paintedP, NaN), ...paintedGroups("stiffness", document.stiffness, 1)];
   return {
-    mesh: meshName,
-    handles: document.handles.map(handleJson),
+    mesh: mesh.name,
+    handles: document.handles.map((handle) => handleJson(handle, mesh)),
     ...(document.region && { region: document.region }),
     ...(groups.length > 0 && { groups }),
   };
 }
 
-function handleJson({ name, vertices, points, pose, targets, hold, footprint }: Handle): object {
+function handleJson(handle: Handle, mesh: Mesh): object {
+  const { name, vertices, points, pose, hold, footprint } = handle;
+  const targets = handle.targets ?? (pose.scale && !kindOf(hold).isTurnedOnly ? [...targetsOf(handle, mesh)] : undefined);
   const { axis, angle } = axisAngle(pose.rotation);
   const { fileKey, weight, direction } = kindOf(hold);
   return {

@@ -1,13 +1,14 @@
 import type { Encoding } from "lpdeform-client";
-import { type Document, emptyDocument, handleOf } from "../model/document.js";
+import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
 import { leastP, mostP } from "../model/exponent.js";
 import type { Mesh, Vector3 } from "../model/mesh.js";
+import type { Pose } from "../model/pose.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
-import type { ColourBy, View } from "../model/view.js";
+import { type ColourBy, colourings, type View } from "../model/view.js";
 import { FileFault } from "./fault.js";
 import { gunzip, gzip } from "./gzip.js";
 import { isPlace } from "./places.js";
-import { readKeyPoses } from "./project_poses.js";
+import { readKeyPoses, readPose } from "./project_poses.js";
 import { handlesJson, readHandles } from "./handlefile.js";
 import { readStoredMesh, storedMesh } from "./project_mesh.js";
 import { isObject, joinSections, splitSections } from "./sections.js";
@@ -57,7 +58,7 @@ const viewChecks: { readonly [K in keyof ProjectView]: (value: unknown) => boole
   pinned: (value) => value === undefined || (typeof value === "number" && value > 0 && value < Infinity),
   isWelded: isBoolean,
   isSplit: isBoolean,
-  colourBy: oneOf<ColourBy>("distortion", "p", "stiffness", "normals", "plain"),
+  colourBy: oneOf<ColourBy>(...colourings),
   wireframe: isBoolean,
   ghost: isBoolean,
   encoding: oneOf<Encoding>("float32", "quantized", "compressed"),
@@ -75,9 +76,9 @@ export async function writeProject({ mesh, document, view, look }: Project): Pro
     p,
     secondP,
     isAutomatic,
-    handles: handlesJson(document, mesh.name),
+    handles: handlesJson(document, mesh),
     poses: keyPoses ?? [],
-    marks: handles.map(({ colour, isLocked }) => ({ colour, isLocked })),
+    marks: handles.map(({ colour, isLocked, pose }) => ({ colour, isLocked, ...(pose.scale && { pose }) })),
     view: Object.fromEntries(viewKeys.map((key) => [key, view[key]])),
     camera: look,
   };
@@ -119,7 +120,7 @@ function documentOf(head: Record<string, unknown>, mesh: Mesh, file: string): Do
     ...document,
     ...(keyPoses.length > 0 && { keyPoses }),
     isAutomatic: isAutomatic as boolean,
-    handles: document.handles.map((handle, k) => ({ ...handle, ...markOf(marks, k, handle.name, file) })),
+    handles: document.handles.map((handle, k) => marked(handle, markOf(marks, k, handle.name, file))),
   };
 }
 
@@ -132,11 +133,21 @@ function withoutMarks(handles: unknown, settings: Document, mesh: Mesh, file: st
   }
 }
 
-/** How the page shows the k-th handle. */
-function markOf(marks: unknown, k: number, name: string, file: string): { colour: string; isLocked: boolean } {
-  const { colour, isLocked } = Array.isArray(marks) && isObject(marks[k]) ? marks[k] : {};
+/** What the page knows of a handle beside its handle file; `pose` if that has the handle's positions for it. */
+type Mark = Pick<Handle, "colour" | "isLocked"> & { pose?: Pose };
+
+function marked(handle: Handle, { pose, ...rest }: Mark): Handle {
+  const { targets: _, ...untargeted } = handle;
+  return pose ? { ...untargeted, ...rest, pose } : { ...handle, ...rest };
+}
+
+/** Of the k-th handle. */
+function markOf(marks: unknown, k: number, name: string, file: string): Mark {
+  const { colour, isLocked, pose } = Array.isArray(marks) && isObject(marks[k]) ? marks[k] : {};
+  const read = pose === undefined ? undefined : readPose(pose);
+  if (pose !== undefined && !read) throw new FileFault(`In ${file}, the scaled pose of handle “${name}” is none.`);
   if (typeof colour === "string" && /^#[0-9a-f]{6}$/i.test(colour) && typeof isLocked === "boolean")
-    return { colour, isLocked };
+    return { colour, isLocked, ...(read && { pose: read }) };
   throw new FileFault(`In ${file}, handle “${name}” has no colour, or it is not said whether it is locked.`);
 }
 

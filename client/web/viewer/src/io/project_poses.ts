@@ -1,6 +1,7 @@
 import { leastP, mostP } from "../model/exponent.js";
 import type { KeyPose } from "../model/document.js";
-import type { Quaternion } from "../model/pose.js";
+import { leastScale, mostScale, type Pose, type Quaternion } from "../model/pose.js";
+import type { Vector3 } from "../model/mesh.js";
 import { FileFault } from "./fault.js";
 import { isPlace } from "./places.js";
 import { isObject } from "./sections.js";
@@ -29,10 +30,22 @@ function poseOf(json: unknown): KeyPose | undefined {
 
 function handleOf(json: unknown): KeyPose["handles"][number] | undefined {
   const { name, pose, targets } = isObject(json) ? json : {};
-  const { rotation, translation, center } = isObject(pose) ? pose : {};
-  if (typeof name !== "string" || !isRotation(rotation) || !isPlace(translation) || !isPlace(center)) return undefined;
+  const read = readPose(pose);
+  if (typeof name !== "string" || !read) return undefined;
   if (targets !== undefined && !(Array.isArray(targets) && targets.every((value) => Number.isFinite(value)))) return undefined;
-  return { name, pose: { rotation, translation, center }, ...(targets !== undefined && { targets: targets as number[] }) };
+  return { name, pose: read, ...(targets !== undefined && { targets: targets as number[] }) };
+}
+
+/** Undefined if it is none. */
+export function readPose(json: unknown): Pose | undefined {
+  const { rotation, translation, center, scale } = isObject(json) ? json : {};
+  if (!isRotation(rotation) || !isPlace(translation) || !isPlace(center)) return undefined;
+  if (scale === undefined) return { rotation, translation, center };
+  return isScale(scale) ? { rotation, translation, center, scale } : undefined;
+}
+
+function isScale(json: unknown): json is Vector3 {
+  return isPlace(json) && json.every((value) => value >= leastScale && value <= mostScale);
 }
 
 function isRotation(json: unknown): json is Quaternion {

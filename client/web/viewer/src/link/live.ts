@@ -9,6 +9,7 @@ import {
   openSession,
   type Session,
   type SolveResult,
+  joinSession,
 } from "lpdeform-client";
 import { changes, exponent, newSession, type Side } from "../model/changes.js";
 import type { Document } from "../model/document.js";
@@ -16,6 +17,7 @@ import type { Mesh } from "../model/mesh.js";
 import { Meter } from "./meter.js";
 import { Pulse } from "./pulse.js";
 import { isPassing, notAnswering, say, type Status, statusAtEnd, statusOf } from "./status.js";
+import { watchedStatus } from "./watched.js";
 
 export interface LiveWatcher {
   /** Prepares a frame elsewhere before it waits to be taken. Undefined: the page takes it as it is. */
@@ -75,6 +77,8 @@ export class Live {
     readonly watcher: LiveWatcher,
     /** For each vertex a number, the same for vertices that count as one. */
     readonly weld?: Uint32Array,
+    /** Somebody else's session, which is only shown. */
+    readonly watched?: string,
   ) {
     this.#pulse = new Pulse(
       async () => this.#session?.ping(),
@@ -98,6 +102,11 @@ export class Live {
     this.#taken?.();
     this.#answer(newer ?? frame);
     return newer ?? frame;
+  }
+
+  /** Undefined while the server has none. */
+  get sessionName(): string | undefined {
+    return this.#session?.name;
   }
 
   #answer({ inputSeq }: Frame): void {
@@ -224,23 +233,23 @@ export class Live {
     const { signal } = this.#over;
     for (;;) {
       if (!isPassing(this.status)) this.#setStatus(say("opening", "Preparing…"));
+      const frames = {
+        encoding: this.encoding,
+        lowestEncoding: "compressed",
+        certify: true,
+        maxFramesPerSecond: 60,
+        signal,
+      } as const;
       try {
+        if (this.watched) return await joinSession(this.watched, frames);
         return await openSession(
           { vertices: exact ?? positions, faces },
-          {
-            freeComponents: "follow",
-            encoding: this.encoding,
-            lowestEncoding: "compressed",
-            certify: true,
-            maxFramesPerSecond: 60,
-            signal,
-            ...(this.weld && { weld: this.weld }),
-          },
+          { ...frames, freeComponents: "follow", ...(this.weld && { weld: this.weld }) },
         );
       } catch (thrown) {
         if (signal.aborted) return undefined;
         const error = thrown as LpdeformError;
-        this.#setStatus(statusOf(error));
+        this.#setStatus(this.#statusOf(error));
         if (!isPassing(this.status)) return undefined;
         await pause(this.#backoff.nextMs(error.retryAfterMs), signal);
         if (signal.aborted) return undefined;
@@ -271,7 +280,7 @@ export class Live {
       const error = thrown as LpdeformError;
       askedMs = error.retryAfterMs;
       if (this.#over.signal.aborted) return { hadFrames, askedMs };
-      this.#setStatus(statusAtEnd(error));
+      this.#setStatus(this.watched ? watchedStatus(error) : statusAtEnd(error));
       void session.close().catch(() => undefined);
       this.#session = undefined;
     }
@@ -280,7 +289,7 @@ export class Live {
 
   #tell(time: number): void {
     const session = this.#session;
-    const update = session && changes(this.#told, this.document, this.side);
+    const update = session && !this.watched && changes(this.#told, this.document, this.mesh, this.side);
     if (!session || !update) return;
     const isInput = this.#told !== newSession;
     this.#told = this.document;
@@ -308,8 +317,12 @@ export class Live {
     else this.#pulse.stop();
     if (connection === "connected") this.#setStatus(live);
     if (connection === "reconnecting") {
-      this.#setStatus(statusOf(this.#session?.interruption ?? new LpdeformError("unavailable", "")));
+      this.#setStatus(this.#statusOf(this.#session?.interruption ?? new LpdeformError("unavailable", "")));
     }
+  }
+
+  #statusOf(error: LpdeformError): Status {
+    return this.watched ? watchedStatus(error) : statusOf(error);
   }
 
   #setStatus(status: Status): void {

@@ -5,16 +5,15 @@ import type { Document } from "../model/document.js";
 import type { Mesh } from "../model/mesh.js";
 
 /**
- * The shapes of a document at these values of p, in this order, each solved from the one before, in a session of its own. `weld`: as
- * in Live. Throws an LpdeformError.
+ * The shapes of these documents, in this order, each solved from the one before, in a session of its own. `weld`: as in Live. Throws
+ * an LpdeformError.
  */
-export async function* shapesAt(
+export async function* shapesOf(
   mesh: Mesh,
-  document: Document,
-  ps: readonly number[],
+  documents: readonly Document[],
   weld: Uint32Array | undefined,
   signal: AbortSignal,
-): AsyncGenerator<[number, Shape]> {
+): AsyncGenerator<Shape> {
   const { positions, exact, faces } = mesh;
   const session = await openSession(
     { vertices: exact ?? positions, faces },
@@ -22,13 +21,12 @@ export async function* shapesAt(
   );
   try {
     let told = newSession;
-    for (const p of ps) {
-      const asked = { ...document, p };
-      const update = changes(told, asked);
+    for (const asked of documents) {
+      const update = changes(told, asked, mesh);
       if (update) session.update(update);
       told = asked;
       const { positions, distortion } = await session.settle({ signal });
-      yield [p, { positions, distortion }];
+      yield { positions, distortion };
     }
   } finally {
     void session.close().catch(() => undefined); // it expires by itself if the server is away

@@ -1,5 +1,5 @@
 import { changeHandle, type Document, type Handle, handleOf, type KeyPose } from "./document.js";
-import { about, add, axisAngle, conjugate, type Pose, product, quaternionOf } from "./pose.js";
+import { about, add, axisAngle, conjugate, noScale, type Pose, product, quaternionOf, scaled } from "./pose.js";
 
 /** The document as it is, under the first free name of the form "Pose 2". */
 export function keyPoseOf({ keyPoses = [], handles, p }: Document): KeyPose {
@@ -17,7 +17,7 @@ export function atPose(document: Document, pose: KeyPose): Document {
   return between(document, pose, pose, 1);
 }
 
-/** The document at a share of the way from one pose to another: rotations by the shorter way, p by its logarithm. */
+/** The document at a share of the way from one pose to another: rotations by the shorter way, p and scales by their logarithms. */
 export function between(document: Document, from: KeyPose, to: KeyPose, share: number): Document {
   const p = share === 1 ? to.p : from.p * (to.p / from.p) ** share;
   let result: Document = { ...document, p };
@@ -46,11 +46,14 @@ function mixedPose(from: Pose, to: Pose, share: number): Pose {
   const { axis, angle } = axisAngle(product(to.rotation, conjugate(from.rotation)));
   const shorter = angle > Math.PI ? angle - 2 * Math.PI : angle;
   const move = to.translation.map((value, k) => share * (value - from.translation[k]!)) as [number, number, number];
-  return {
+  const [low, high] = [from.scale ?? noScale, to.scale ?? noScale];
+  const scale = low.map((value, k) => value * (high[k]! / value) ** share) as [number, number, number];
+  const pose = {
     center: from.center,
     translation: add(from.translation, move),
     rotation: product(quaternionOf(axis, share * shorter), from.rotation),
   };
+  return scaled(pose, scale);
 }
 
 /** The document at a time in seconds when its poses are played one after the other; undefined at their end. */

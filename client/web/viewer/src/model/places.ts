@@ -18,11 +18,11 @@ export function placesOf(vertices: readonly number[], points: readonly SurfacePo
 }
 
 /** Writes x, y, z of each place to `out`. */
-export function follow(
+export function follow<Out extends Float32Array | Float64Array = Float32Array>(
   { corners, weights }: Places,
-  positions: Float32Array,
-  out: Float32Array = new Float32Array(corners.length),
-): Float32Array {
+  positions: Float32Array | Float64Array,
+  out: Out = new Float32Array(corners.length) as Out,
+): Out {
   for (let k = 0; k < corners.length; k += 3) {
     const [a, b, c] = [3 * corners[k]!, 3 * corners[k + 1]!, 3 * corners[k + 2]!];
     const [u, v, w] = [weights[k]!, weights[k + 1]!, weights[k + 2]!];

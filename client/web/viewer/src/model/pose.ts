@@ -4,21 +4,32 @@ import type { Vector3 } from "./mesh.js";
 /** x, y, z, w of a unit quaternion. */
 export type Quaternion = readonly [number, number, number, number];
 
-/** x = R (p - center) + center + translation, relative to the mesh at rest. */
+/** x = R S (p - center) + center + translation, relative to the mesh at rest. */
 export interface Pose {
   rotation: Quaternion;
   translation: Vector3;
   center: Vector3;
+  /** S: how much larger along the handle's own axes. Left out: 1. */
+  scale?: Vector3;
 }
 
 export const noRotation: Quaternion = [0, 0, 0, 1];
+export const noScale: Vector3 = [1, 1, 1];
+export const leastScale = 0.01;
+export const mostScale = 100;
 
 export function atRest(center: Vector3): Pose {
   return { rotation: noRotation, translation: [0, 0, 0], center };
 }
 
-export function isAtRest({ rotation, translation }: Pose): boolean {
-  return Math.abs(rotation[3]) > 1 - 1e-12 && translation.every((value) => value === 0);
+export function isAtRest({ rotation, translation, scale }: Pose): boolean {
+  return Math.abs(rotation[3]) > 1 - 1e-12 && translation.every((value) => value === 0) && !scale;
+}
+
+/** The pose with its scale, each factor kept between leastScale and mostScale. */
+export function scaled({ scale: _, ...rest }: Pose, scale: Vector3): Pose {
+  const [x, y, z] = scale.map((value) => Math.min(Math.max(value, leastScale), mostScale)) as [number, number, number];
+  return x === 1 && y === 1 && z === 1 ? rest : { ...rest, scale: [x, y, z] };
 }
 
 /** The place to which the middle of the handle moves. */
@@ -39,13 +50,14 @@ export function quaternionOf(axis: Vector3, angle: number): Quaternion {
   return [axis[0] * sine, axis[1] * sine, axis[2] * sine, Math.cos(angle / 2)];
 }
 
+/** Of a pose without scale. */
 export function toMotion(pose: Pose): Motion {
   if (isAtRest(pose)) return "fixed";
   return { ...axisAngle(pose.rotation), center: pose.center, translation: pose.translation };
 }
 
-export function apply({ rotation, translation, center }: Pose, point: Vector3): Vector3 {
-  return add(add(rotate(rotation, subtract(point, center)), center), translation);
+export function apply({ rotation, translation, center, scale = noScale }: Pose, point: Vector3): Vector3 {
+  return add(add(rotate(rotation, times(scale, subtract(point, center))), center), translation);
 }
 
 /** Rotated by `angle` radians about an axis through the present place of its center. */
@@ -60,6 +72,11 @@ export function about(pose: Pose, center: Vector3): Pose {
 
 export function add(a: Vector3, b: Vector3): Vector3 {
   return [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+}
+
+/** Number by number. */
+export function times(a: Vector3, b: Vector3): Vector3 {
+  return [a[0] * b[0], a[1] * b[1], a[2] * b[2]];
 }
 
 export function subtract(a: Vector3, b: Vector3): Vector3 {

@@ -6,6 +6,8 @@ export type Snapping = "none" | "grid" | "vertices";
 
 /** Of a turn, in degrees. */
 export const turnStep = 15;
+/** Of a scale. */
+export const scaleStep = 0.1;
 /** How far from the pointer a vertex may be that a drag goes to, in pixels. */
 export const reachPixels = 18;
 

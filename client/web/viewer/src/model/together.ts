@@ -1,8 +1,14 @@
 import { anchorOfHandle, changeHandle, type Document, type Handle, handleOf, shifted } from "./document.js";
 import { kindOf } from "./hold_kinds.js";
 import type { Vector3 } from "./mesh.js";
-import { add, anchorOf, conjugate, type Pose, product, rotate, subtract } from "./pose.js";
+import { add, anchorOf, conjugate, noScale, type Pose, product, rotate, scaled, subtract, times } from "./pose.js";
 import type { View } from "./view.js";
+
+const axes: readonly Vector3[] = [
+  [1, 0, 0],
+  [0, 1, 0],
+  [0, 0, 1],
+];
 
 type Selection = Pick<View, "selected" | "alsoSelected">;
 
@@ -34,12 +40,21 @@ export function shiftedTogether(document: Document, handles: readonly Handle[], 
   return movable.reduce((result, handle) => changeHandle(result, handle.name, shifted(handle, by)), document);
 }
 
-/** Moves the first of the handles to the pose, and the others as if all were one rigid body; those that are locked stay. */
+/**
+ * Moves the first of the handles to the pose, and the others as if all were one body; those that are locked stay. If the body becomes
+ * larger in one direction only, a handle that is turned otherwise becomes larger along its own axes by as much as these do.
+ */
 export function posedTogether(document: Document, [first, ...others]: readonly Handle[], pose: Pose): Document {
   if (!first) return document;
   const turn = product(pose.rotation, conjugate(first.pose.rotation));
   const [from, to] = [anchorOf(first.pose), anchorOf(pose)];
-  const carried = (point: Vector3) => add(to, rotate(turn, subtract(point, from)));
+  const grown = (pose.scale ?? noScale).map((value, k) => value / (first.pose.scale ?? noScale)[k]!) as [
+    number,
+    number,
+    number,
+  ];
+  const stretched = (by: Vector3) => rotate(pose.rotation, times(grown, rotate(conjugate(first.pose.rotation), by)));
+  const carried = (point: Vector3) => add(to, stretched(subtract(point, from)));
   let result = changeHandle(document, first.name, { pose });
   for (const handle of others) {
     if (handle.isLocked) continue;
@@ -52,7 +67,10 @@ export function posedTogether(document: Document, [first, ...others]: readonly H
       result = changeHandle(result, name, { targets: points.flatMap((point) => [...carried(point)]) });
     } else {
       const translation = subtract(carried(anchorOfHandle(handle)), old.center);
-      result = changeHandle(result, name, { pose: { ...old, rotation: product(turn, old.rotation), translation } });
+      const moved = { ...old, rotation: product(turn, old.rotation), translation };
+      const factors = axes.map((axis) => Math.hypot(...stretched(rotate(old.rotation, axis)))) as [number, number, number];
+      const isScaled = grown.some((value) => value !== 1);
+      result = changeHandle(result, name, { pose: isScaled ? scaled(moved, times(factors, old.scale ?? noScale)) : moved });
     }
   }
   return result;

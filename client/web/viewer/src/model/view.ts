@@ -1,16 +1,22 @@
 import type { Encoding } from "lpdeform-client";
 import type { PaletteName } from "./palettes.js";
 import type { Snapping } from "./snap.js";
+import type { Symmetry } from "./mirror.js";
 import type { PaintField, PaintMode } from "./soft_paint.js";
 import type { Detail } from "./shapes.js";
 
 export type Tool = "move" | "brush" | "lasso" | "box" | "paint";
 
-/** Along which axes the gizmo moves and turns: those of the mesh, of the handle, or of the picture. */
+export type GizmoMode = "translate" | "rotate" | "scale";
+
+/** Along which axes the gizmo moves and turns: those of the mesh, of the handle, or of the picture. It scales along the handle's. */
 export type GizmoAxes = "world" | "local" | "view";
 
 /** What the colours show. */
-export type ColourBy = "distortion" | "p" | "stiffness" | "normals" | "plain";
+export type ColourBy = "distortion" | "p" | "stiffness" | "normals" | "clay" | "texture" | "plain";
+
+/** In the order of the page. */
+export const colourings: readonly ColourBy[] = ["distortion", "p", "stiffness", "normals", "clay", "texture", "plain"];
 
 /** What a selecting stroke does: make a new handle, add to the selected one, or release vertices. */
 export type StrokeMode = "new" | "add" | "release";
@@ -22,9 +28,11 @@ export interface View {
   selected: string | undefined;
   /** Other handles that are moved together with the selected one. Selecting another handle empties the list. */
   alsoSelected: readonly string[];
-  gizmo: "translate" | "rotate";
+  gizmo: GizmoMode;
   axes: GizmoAxes;
   snapping: Snapping;
+  /** Across which plane selecting, painting and moving handles is done on both sides. */
+  symmetry: Symmetry;
   /** Of the brush, as a share of the mesh's diagonal. */
   radius: number;
   /** Whether lasso and box also take vertices that face away. */
@@ -45,6 +53,8 @@ export interface View {
   pinned: number | undefined;
   isSplit: boolean;
   isYUp: boolean;
+  /** Whether it is drawn without perspective. */
+  isParallel: boolean;
   /** Whether vertices in the same place along seams count as one; see Seams. */
   isWelded: boolean;
   isDark: boolean;
@@ -64,6 +74,7 @@ export const firstView: View = {
   gizmo: "translate",
   axes: "world",
   snapping: "none",
+  symmetry: "none",
   radius: 0.05,
   isThrough: true,
   paintField: "p",
@@ -79,6 +90,7 @@ export const firstView: View = {
   pinned: undefined,
   isSplit: false,
   isYUp: false,
+  isParallel: false,
   isWelded: true,
   isDark: true,
   isPanelOpen: true,

@@ -1,11 +1,14 @@
 import * as three from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 import type { Vector3 } from "../model/mesh.js";
-import { conjugate, isAtRest, noRotation, type Pose, product, type Quaternion } from "../model/pose.js";
-import { onGrid, onTurnedGrid, turnStep } from "../model/snap.js";
-import type { GizmoAxes } from "../model/view.js";
+import { conjugate, isAtRest, noRotation, noScale, type Pose, product, type Quaternion, scaled } from "../model/pose.js";
+import { onGrid, onTurnedGrid, scaleStep, turnStep } from "../model/snap.js";
+import type { GizmoAxes, GizmoMode } from "../model/view.js";
 
-/** Arrows and rings on the selected handle. */
+/** Of the pointer to the right and up, for a scale of e along all axes. */
+const pixelsPerE = 200;
+
+/** Arrows, rings or cubes on the selected handle. */
 export class Gizmo {
   /** Called with each pose during a drag. */
   onPose: (pose: Pose) => void = () => undefined;
@@ -21,13 +24,25 @@ export class Gizmo {
   #step: number | undefined;
   /** How the gizmo's axes are turned at the start of a drag. */
   #frame = noRotation;
-  readonly #camera: three.Camera;
+  #camera: three.Camera;
+  /** Where it was pressed, and where it is, in pixels of the page. */
+  #pointer: [readonly [number, number], readonly [number, number]] = [
+    [0, 0],
+    [0, 0],
+  ];
 
   constructor(camera: three.Camera, canvas: HTMLCanvasElement, changed: () => void) {
     this.#camera = camera;
     this.#controls = new TransformControls(camera, canvas);
     this.object.add(this.#controls.getHelper(), this.#anchor);
     removeBackwardArrows(this.#controls.getHelper());
+    for (const kind of ["pointerdown", "pointermove"] as const) {
+      const follow = ({ clientX, clientY }: PointerEvent) => {
+        const at = [clientX, clientY] as const;
+        this.#pointer = [kind === "pointerdown" ? at : this.#pointer[0], at];
+      };
+      canvas.addEventListener(kind, follow, { capture: true });
+    }
     // The browser has taken the pointer; three.js listens only for a pointer that is released.
     canvas.addEventListener("pointercancel", () => this.cancel());
     this.#controls.setSize(0.72);
@@ -64,22 +79,29 @@ export class Gizmo {
   }
 
   /** Undefined: no handle is selected, or it cannot be moved. `step`: of the grid to which it keeps, if there is one. */
-  show(pose: Pose | undefined, mode: "translate" | "rotate", axes: GizmoAxes = "world", step?: number): void {
+  show(pose: Pose | undefined, mode: GizmoMode, axes: GizmoAxes = "world", step?: number): void {
     this.#controls.setMode(mode);
     if (this.isDragging) return;
     this.#pose = pose;
-    this.#axes = axes;
+    this.#axes = mode === "scale" ? "local" : axes;
     this.#step = step;
     this.#controls.setRotationSnap(step === undefined ? null : (turnStep * Math.PI) / 180);
+    this.#controls.setScaleSnap(step === undefined ? null : scaleStep);
     if (!pose) {
       this.#controls.detach();
       return;
     }
     const { center, translation } = pose;
     this.#anchor.position.set(center[0] + translation[0], center[1] + translation[1], center[2] + translation[2]);
+    this.#anchor.scale.set(...(pose.scale ?? noScale));
     this.#turnAnchor();
     if (this.#controls.object !== this.#anchor) this.#controls.attach(this.#anchor);
-    this.#controls.setSpace(axes === "world" ? "world" : "local");
+    this.#controls.setSpace(this.#axes === "world" ? "world" : "local");
+  }
+
+  lookThrough(camera: three.Camera): void {
+    this.#camera = camera;
+    this.#controls.camera = camera;
   }
 
   /** Before each picture: the axes of the picture turn with the view. */
@@ -101,14 +123,26 @@ export class Gizmo {
   #moved(): void {
     if (!this.#pose) return;
     const { center, translation: before, rotation: from } = this.#pose;
-    const { position, quaternion } = this.#anchor;
+    const { position, quaternion, scale } = this.#anchor;
+    if (this.#controls.mode === "scale") {
+      return this.onPose(scaled(this.#pose, this.#controls.axis === "XYZ" ? this.#grown() : scale.toArray()));
+    }
     const to: Vector3 = [position.x - center[0], position.y - center[1], position.z - center[2]];
     const translation = this.#step === undefined ? to : this.#snapped(before, to, this.#step);
     position.set(center[0] + translation[0], center[1] + translation[1], center[2] + translation[2]);
     // The anchor is turned as the gizmo's axes are; what the drag has added to that turns the handle.
     const added = product(quaternion.toArray() as unknown as Quaternion, conjugate(this.#frame));
-    const pose: Pose = { center, translation, rotation: product(added, from) };
+    const pose: Pose = { ...this.#pose, translation, rotation: product(added, from) };
     this.onPose(isAtRest(pose) ? { ...pose, translation: [0, 0, 0] } : pose);
+  }
+
+  /** Where three.js would scale by the distance from the middle, in which the pointer has taken the cube. */
+  #grown(): Vector3 {
+    const [[x0, y0], [x1, y1]] = this.#pointer;
+    const factor = Math.exp((x1 - x0 + y0 - y1) / pixelsPerE);
+    const [x, y, z] = this.#pose!.scale ?? noScale;
+    const kept = (value: number) => (this.#step === undefined ? value : Math.max(Math.round(value / scaleStep), 1) * scaleStep);
+    return [kept(factor * x), kept(factor * y), kept(factor * z)];
   }
 
   #snapped(before: Vector3, to: Vector3, step: number): Vector3 {

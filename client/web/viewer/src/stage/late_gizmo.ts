@@ -17,7 +17,7 @@ export class LateGizmo {
 
   /** `loaded`: called once it listens to the canvas, after everything that was there before. */
   constructor(
-    readonly camera: three.Camera,
+    public camera: three.Camera,
     readonly canvas: HTMLCanvasElement,
     readonly changed: () => void,
     readonly loaded: () => void,
@@ -39,6 +39,11 @@ export class LateGizmo {
     this.#shown = [pose, ...rest];
     if (this.#gizmo) this.#gizmo.show(...this.#shown);
     else if (pose) this.#loading ??= this.#load();
+  }
+
+  lookThrough(camera: three.Camera): void {
+    this.camera = camera;
+    this.#gizmo?.lookThrough(camera);
   }
 
   follow(): void {

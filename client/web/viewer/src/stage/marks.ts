@@ -1,21 +1,20 @@
 import * as three from "three";
 import type { Handle } from "../model/document.js";
-import { type Ahead, place } from "./ahead.js";
+import { type Ahead, before, place } from "./ahead.js";
 import { follow, type Places, placesOf } from "../model/places.js";
 
 const vertexShader = `
 attribute vec3 colour;
 attribute float size;
 ${place}
+${before}
 uniform float pixelRatio;
 varying vec3 vColour;
 varying float vRing;
 void main() {
   vColour = colour;
   vRing = smoothstep(6.5, 8.5, size);
-  vec4 seen = modelViewMatrix * vec4(placed(), 1.0);
-  seen.xyz *= 0.996; // before the surface that it lies on, in the same place of the picture
-  gl_Position = projectionMatrix * seen;
+  gl_Position = projectionMatrix * before(modelViewMatrix * vec4(placed(), 1.0));
   gl_PointSize = size * pixelRatio;
 }`;
 

@@ -1,14 +1,13 @@
 import * as three from "three";
-import { place } from "./ahead.js";
+import { before, place } from "./ahead.js";
 import type { Surface } from "./surface.js";
 
 const vertexShader = `
 ${place}
+${before}
 uniform float size;
 void main() {
-  vec4 seen = modelViewMatrix * vec4(placed(), 1.0);
-  seen.xyz *= 0.996; // before the surface that it lies on, in the same place of the picture
-  gl_Position = projectionMatrix * seen;
+  gl_Position = projectionMatrix * before(modelViewMatrix * vec4(placed(), 1.0));
   gl_PointSize = size;
 }`;
 
@@ -66,18 +65,25 @@ export class PointedMarks {
   }
 
   dispose(): void {
-    this.object.geometry.dispose();
+    this.#dropGeometry();
     (this.object.material as three.Material).dispose();
   }
 
   #clear(room: number): void {
     this.#shown = [];
     this.#count = 0;
-    this.object.geometry.dispose();
+    this.#dropGeometry();
     this.object.geometry = new three.BufferGeometry();
     this.object.geometry.setIndex(new three.BufferAttribute(new Uint32Array(room), 1).setUsage(three.DynamicDrawUsage));
     this.#surface?.share(this.object.geometry);
     this.object.geometry.setDrawRange(0, 0);
+  }
+
+  /** Without what it shares with the surface, whose buffers would be deleted with it. */
+  #dropGeometry(): void {
+    const { geometry } = this.object;
+    for (const name of Object.keys(geometry.attributes)) geometry.deleteAttribute(name);
+    geometry.dispose();
   }
 
   #add(vertices: readonly number[]): void {

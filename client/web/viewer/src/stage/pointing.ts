@@ -73,9 +73,8 @@ export class Pointing {
     const box = this.stage.canvas.getBoundingClientRect();
     const x = event.clientX - box.left;
     const y = event.clientY - box.top;
-    const { camera, surface } = this.stage;
-    const near = new three.Vector3((2 * x) / box.width - 1, 1 - (2 * y) / box.height, -1).unproject(camera);
-    const ray = new three.Ray(camera.position.clone(), near.sub(camera.position).normalize());
+    const { surface } = this.stage;
+    const ray = this.stage.rayAt((2 * x) / box.width - 1, 1 - (2 * y) / box.height);
     let found: { hit: Hit | undefined } | undefined;
     return {
       x,

@@ -6,6 +6,7 @@ import { Backdrop } from "./backdrop.js";
 import { Highlight } from "./highlight.js";
 import { LateGizmo } from "./late_gizmo.js";
 import { Marks } from "./marks.js";
+import { MirrorPlane } from "./mirror_plane.js";
 import { PointedMarks } from "./pointed_marks.js";
 import { isSoftware } from "./software.js";
 import { Surface } from "./surface.js";
@@ -34,9 +35,13 @@ function coveredAt(width: number): { left: number; top: number; bottom: number }
 /** One picture of a surface: canvas, camera, and what is drawn. It draws only when it is told to. */
 export class Stage {
   readonly canvas = document.createElement("canvas");
-  readonly camera = new three.PerspectiveCamera(32, 1, 0.01, 1000);
+  /** Where the user looks from. What is looked through is `camera`. */
+  readonly #camera = new three.PerspectiveCamera(32, 1, 0.01, 1000);
+  readonly #parallel = new three.OrthographicCamera();
+  #isParallel = false;
   readonly marks = new Marks();
   readonly pointed = new PointedMarks();
+  readonly plane = new MirrorPlane();
   readonly highlight: Highlight;
   readonly gizmo: LateGizmo;
   surface: Surface | undefined;
@@ -54,15 +59,61 @@ export class Stage {
     this.canvas.setAttribute("aria-roledescription", "picture to work in");
     this.#renderer = new three.WebGLRenderer({ canvas: this.canvas, antialias: !isSoftware, alpha: false });
     this.canvas.addEventListener("webglcontextrestored", changed);
-    this.camera.up.set(0, 0, 1);
+    this.#camera.up.set(0, 0, 1);
     this.highlight = new Highlight(changed);
-    this.gizmo = new LateGizmo(this.camera, this.canvas, changed, () => this.#restartControls());
-    this.#scene.add(this.#backdrop.object, this.marks.object, this.pointed.object, this.highlight.object, this.gizmo.object);
+    this.gizmo = new LateGizmo(this.#camera, this.canvas, changed, () => this.#restartControls());
+    this.#scene.add(this.#backdrop.object, this.marks.object, this.pointed.object, this.highlight.object);
+    this.#scene.add(this.plane.object, this.gizmo.object);
+  }
+
+  /** The camera that draws. It is read only: lookFrom() and the like change it. */
+  get camera(): three.PerspectiveCamera | three.OrthographicCamera {
+    return this.#isParallel ? this.#followed() : this.#camera;
+  }
+
+  /** Draws without perspective: what is at the target has the same size. */
+  drawParallel(isParallel: boolean): void {
+    if (isParallel === this.#isParallel) return;
+    this.#isParallel = isParallel;
+    this.gizmo.lookThrough(this.camera);
+    this.changed();
+  }
+
+  #followed(): three.OrthographicCamera {
+    const from = this.#camera;
+    const to = this.#parallel;
+    to.position.copy(from.position);
+    to.quaternion.copy(from.quaternion);
+    to.top = Math.tan((from.fov * Math.PI) / 360) * from.position.distanceTo(this.target);
+    to.bottom = -to.top;
+    to.right = to.top * from.aspect;
+    to.left = -to.right;
+    to.near = -from.far; // nothing is behind the viewer
+    to.far = from.far;
+    to.view = from.view;
+    to.updateProjectionMatrix();
+    to.updateMatrixWorld();
+    return to;
+  }
+
+  /** From where surfaces are seen that face the viewer. */
+  get eye(): Vector3 {
+    const { position } = this.#camera;
+    if (!this.#isParallel) return position.toArray();
+    return position.clone().sub(this.target).multiplyScalar(1e5).add(position).toArray();
+  }
+
+  /** The line of sight at a place, in shares of the picture's width and height: from -1 to 1, to the right and up. */
+  rayAt(x: number, y: number): three.Ray {
+    const { camera } = this;
+    const near = new three.Vector3(x, y, -1).unproject(camera);
+    if (this.#isParallel) return new three.Ray(near, camera.getWorldDirection(new three.Vector3()));
+    return new three.Ray(camera.position.clone(), near.sub(camera.position).normalize());
   }
 
   /** Called after all other listeners to the canvas are set: what they take does not turn the view. */
   startControls(): void {
-    const controls = new OrbitControls(this.camera, this.canvas);
+    const controls = new OrbitControls(this.#camera, this.canvas);
     controls.rotateSpeed = 0.9;
     controls.zoomToCursor = true;
     controls.addEventListener("change", this.changed);
@@ -98,7 +149,7 @@ export class Stage {
     const isAtRest = positions === mesh.positions;
     const { min, max, center, diagonal } = isAtRest ? derivedOf(mesh).bounds : boundsOf(positions, mesh.faces);
     const away = isYUp ? new three.Vector3(0.62, 0.42, 1) : new three.Vector3(0.62, -1, 0.42);
-    const { camera } = this;
+    const camera = this.#camera;
     camera.up.set(0, isYUp ? 1 : 0, isYUp ? 0 : 1);
     this.#restartControls(); // OrbitControls reads the camera's up when it is made
     camera.position.copy(away.normalize());
@@ -116,7 +167,7 @@ export class Stage {
    * The distance at which a box fits into the free part of the picture, seen from `place` in the camera's present direction.
    */
   #distanceFor(min: Vector3, max: Vector3, place: Vector3): number {
-    const { camera } = this;
+    const camera = this.#camera;
     const [width, height] = this.#size as [number, number];
     const covered = coveredAt(width);
     const tangent = Math.tan((camera.fov * Math.PI) / 360);
@@ -133,14 +184,14 @@ export class Stage {
   }
 
   get look(): Look {
-    return { position: this.camera.position.toArray(), target: this.target.toArray() };
+    return { position: this.#camera.position.toArray(), target: this.target.toArray() };
   }
 
   /** Call it after fit(). */
   lookFrom({ position, target }: Look): void {
-    this.camera.position.set(...position);
+    this.#camera.position.set(...position);
     this.target.set(...target);
-    this.camera.lookAt(this.target);
+    this.#camera.lookAt(this.target);
     this.#controls?.update();
     this.changed();
   }
@@ -151,12 +202,13 @@ export class Stage {
    */
   lookAt(place: Vector3, normal: Vector3, [least, most]: readonly [number, number]): void {
     const towards = new three.Vector3(...normal);
-    if (towards.length() < 1e-6) towards.copy(this.camera.position).sub(this.target);
+    if (towards.length() < 1e-6) towards.copy(this.#camera.position).sub(this.target);
     // Not from straight above or below, where left and right are unclear.
-    const { up } = this.camera;
+    const { up } = this.#camera;
     towards.normalize().addScaledVector(up, -0.2 * towards.dot(up));
     if (towards.clone().cross(up).length() < 0.1) towards.add(new three.Vector3(0.3, up.z ? -0.3 : 0, up.y ? 0.3 : 0));
-    const { camera, surface } = this;
+    const { surface } = this;
+    const camera = this.#camera;
     const { min, max, center } = boundsOf(surface!.positions, surface!.mesh.faces);
     const isOnIt = place.every((value, axis) => value >= min[axis]! && value <= max[axis]!);
     const middle = new three.Vector3(...place).lerp(new three.Vector3(...center), isOnIt ? 0.5 : 0);
@@ -169,7 +221,8 @@ export class Stage {
 
   /** Looks from this direction at the middle of the surface, all of which is in sight. `front`: what is below where up is unclear. */
   lookAlong(direction: Vector3, front: Vector3): void {
-    const { camera, surface } = this;
+    const { surface } = this;
+    const camera = this.#camera;
     if (!surface) return;
     const { min, max, center } = boundsOf(surface.positions, surface.mesh.faces);
     const away = new three.Vector3(...direction).addScaledVector(new three.Vector3(...front), 1e-4).normalize();
@@ -181,7 +234,8 @@ export class Stage {
 
   /** Turns like dragging the surface to the right and up by this many radians. */
   turn(right: number, up: number): void {
-    const { camera, target } = this;
+    const { target } = this;
+    const camera = this.#camera;
     const toZ = new three.Quaternion().setFromUnitVectors(camera.up, new three.Vector3(0, 1, 0));
     const away = camera.position.clone().sub(target).applyQuaternion(toZ);
     const place = new three.Spherical().setFromVector3(away);
@@ -194,7 +248,8 @@ export class Stage {
 
   /** Shifts the view by this many heights of the picture to the right and up. */
   shift(right: number, up: number): void {
-    const { camera, target } = this;
+    const { target } = this;
+    const camera = this.#camera;
     const height = 2 * Math.tan((camera.fov * Math.PI) / 360) * camera.position.distanceTo(target);
     const by = new three.Vector3(right * height, up * height, 0).applyQuaternion(camera.quaternion);
     this.lookFrom({ position: camera.position.clone().add(by).toArray(), target: target.clone().add(by).toArray() });
@@ -202,20 +257,21 @@ export class Stage {
 
   /** Changes the distance by this factor. */
   approach(factor: number): void {
-    const { camera, target } = this;
+    const { target } = this;
+    const camera = this.#camera;
     const position = target.clone().lerp(camera.position, factor);
     this.lookFrom({ position: position.toArray(), target: target.toArray() });
   }
 
   /** The same view as another stage. */
   lookAs(other: Stage): void {
-    this.camera.position.copy(other.camera.position);
-    this.camera.quaternion.copy(other.camera.quaternion);
-    this.camera.near = other.camera.near;
-    this.camera.far = other.camera.far;
-    this.camera.zoom = other.camera.zoom;
+    this.#camera.position.copy(other.#camera.position);
+    this.#camera.quaternion.copy(other.#camera.quaternion);
+    this.#camera.near = other.#camera.near;
+    this.#camera.far = other.#camera.far;
+    this.#camera.zoom = other.#camera.zoom;
     this.target.copy(other.target);
-    this.camera.updateProjectionMatrix();
+    this.#camera.updateProjectionMatrix();
   }
 
   /**
@@ -230,9 +286,9 @@ export class Stage {
     this.#size = [width, height];
     this.#renderer.setPixelRatio(ratio);
     this.#renderer.setSize(width, height, false);
-    this.camera.aspect = width / Math.max(height, 1);
+    this.#camera.aspect = width / Math.max(height, 1);
     const covered = coveredAt(width);
-    this.camera.setViewOffset(width, height, -covered.left / 2, (covered.bottom - covered.top) / 2, width, height);
+    this.#camera.setViewOffset(width, height, -covered.left / 2, (covered.bottom - covered.top) / 2, width, height);
     const scale = ratio * Math.min(Math.max(height / fullSizeHeight, 0.6), 1);
     this.marks.scale(scale);
     this.pointed.scale(scale);
@@ -277,6 +333,7 @@ export class Stage {
     this.gizmo.dispose();
     this.highlight.dispose();
     this.pointed.dispose();
+    this.plane.dispose();
     this.surface?.dispose();
     this.#renderer.dispose();
     this.#renderer.forceContextLoss(); // browsers allow only a few, and remove the oldest

@@ -9,7 +9,8 @@ import type { ColourBy, View } from "../model/view.js";
 import { DrawMesh } from "./drawmesh.js";
 import type { Intake, IntakeMesh } from "./intake.js";
 import { isSoftware } from "./software.js";
-import { colourByNormal, paint, surfaceMaterial } from "./surface_material.js";
+import { colourByPixel, paint, surfaceMaterial } from "./surface_material.js";
+import type { Textured } from "./textured.js";
 
 /** The value for each colour. */
 export interface Scale {
@@ -45,6 +46,8 @@ export class Surface {
     new three.LineBasicMaterial({ transparent: true, opacity: 0.35 }),
   );
   readonly #ghost: three.Mesh;
+  readonly #plain: three.Mesh;
+  #textured: Textured | undefined;
 
   constructor(
     readonly mesh: Mesh,
@@ -64,8 +67,8 @@ export class Surface {
     geometry.setAttribute("value", live(this.#values, 1));
     geometry.setAttribute("pull", live(this.#pulls, 1));
     this.#ghost = this.#makeGhost();
-    const drawn = new three.Mesh(geometry, this.#material);
-    for (const object of [drawn, this.#wire, this.#ghost]) {
+    this.#plain = new three.Mesh(geometry, this.#material);
+    for (const object of [this.#plain, this.#wire, this.#ghost]) {
       object.frustumCulled = false;
       this.group.add(object);
     }
@@ -106,6 +109,18 @@ export class Surface {
     }
     this.#draw.spread(shares, this.#pulls);
     this.#show("pull", this.#pulls);
+    if (this.#isTextured) this.#textured!.pull(this.#pulls);
+  }
+
+  /** Makes what is shown if colours are by texture. */
+  dress(make: (indices: Uint32Array, makeMaterial: () => three.ShaderMaterial) => Textured): void {
+    this.#textured = make(this.#draw.indices, () => surfaceMaterial(this.#isPerVertex, this.#draw.isClosed, this.ahead));
+    this.#textured.object.visible = false;
+    this.group.add(this.#textured.object);
+  }
+
+  get #isTextured(): boolean {
+    return this.#textured?.object.visible === true;
   }
 
   /** Where a vertex is drawn. */
@@ -134,6 +149,7 @@ export class Surface {
     }
     this.#show("position", this.#draw.positions);
     this.#show("normal", this.#draw.normals);
+    if (this.#isTextured) this.#textured!.move(this.#draw);
   }
 
   #show(name: "position" | "normal" | "value" | "pull", array: Float32Array): void {
@@ -153,8 +169,19 @@ export class Surface {
     uniforms["low"]!.value = low;
     uniforms["red"]!.value = red;
     uniforms["logarithmic"]!.value = isLogarithmic ? 1 : 0;
-    uniforms["colourful"]!.value = values && by !== "plain" && by !== "normals" ? 1 : 0;
-    colourByNormal(this.#material, by === "normals", this.#isPerVertex);
+    uniforms["colourful"]!.value = values ? 1 : 0;
+    colourByPixel(this.#material, by, this.#isPerVertex);
+    this.#showTexture(by === "texture");
+  }
+
+  /** What has moved meanwhile is taken when it is shown. */
+  #showTexture(isOn: boolean): void {
+    if (!this.#textured || isOn === this.#isTextured) return;
+    this.#textured.object.visible = isOn;
+    this.#plain.visible = !isOn;
+    if (!isOn) return;
+    this.#textured.move(this.#draw);
+    this.#textured.pull(this.#pulls);
   }
 
   show({ wireframe, ghost, isDark, palette }: Pick<View, "wireframe" | "ghost" | "isDark" | "palette">): void {
@@ -172,6 +199,7 @@ export class Surface {
     this.#ghost.geometry.dispose();
     for (const { material } of [this.#wire, this.#ghost]) (material as three.Material).dispose();
     this.#material.dispose();
+    this.#textured?.dispose();
   }
 
   /** Once, when they are first needed, because it takes some time for large meshes. */

@@ -1,5 +1,6 @@
 import * as three from "three";
 import { type PaletteName, palettes } from "../model/palettes.js";
+import type { ColourBy } from "../model/view.js";
 import { type Ahead, place } from "./ahead.js";
 
 // Lit from the camera and from above, in sRGB throughout: without conversions the surface has the legend's
@@ -14,8 +15,21 @@ vec2 lit(vec3 normal, vec3 toEye) {
   return vec2(diffuse, 0.16 * pow(max(dot(normal, normalize(key + toEye)), 0.0), 40.0));
 }`;
 
+/** What a ball of clay shows where its normal is this, seen from +z: a material whose light comes with the viewer (a “matcap”). */
+const clay = `
+vec3 clayAt(vec3 normal) {
+  float lit = smoothstep(-0.55, 1.0, dot(normal, normalize(vec3(-0.35, 0.62, 0.7))));
+  vec3 colour = mix(vec3(0.2, 0.09, 0.08), vec3(0.86, 0.55, 0.42), lit);
+  colour += vec3(0.2, 0.23, 0.3) * smoothstep(0.55, 0.0, normal.z) * max(0.4 - normal.y, 0.0);
+  return colour + 0.28 * pow(max(dot(normal, normalize(vec3(-0.3, 0.5, 0.81))), 0.0), 28.0);
+}`;
+
 const vertexShader = `
 attribute float value;
+#ifdef TEXTURED
+attribute vec2 place;
+varying vec2 vPlace;
+#endif
 varying float vValue;
 #ifdef PER_VERTEX
 varying vec2 vLit;
@@ -28,13 +42,16 @@ ${place}
 void main() {
   vec4 seen = modelViewMatrix * vec4(placed(), 1.0);
   vValue = value;
+#ifdef TEXTURED
+  vPlace = place;
+#endif
 #ifdef PER_VERTEX
-  vec3 toEye = normalize(-seen.xyz);
+  vec3 toEye = isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(-seen.xyz);
   vec3 facing = normalize(normalMatrix * normal);
   vLit = lit(dot(facing, toEye) < -0.1 ? -facing : facing, toEye);
 #else
   vNormal = normalMatrix * normal;
-  vToEye = -seen.xyz;
+  vToEye = isOrthographic ? vec3(0.0, 0.0, 1.0) : -seen.xyz;
 #endif
   gl_Position = projectionMatrix * seen;
 }`;
@@ -47,6 +64,10 @@ uniform float colourful;
 uniform vec3 plain;
 uniform vec3 stops[5];
 varying float vValue;
+#ifdef TEXTURED
+uniform sampler2D image;
+varying vec2 vPlace;
+#endif
 #ifdef PER_VERTEX
 varying vec2 vLit;
 #else
@@ -54,6 +75,7 @@ varying vec3 vNormal;
 varying vec3 vToEye;
 #endif
 ${light}
+${clay}
 vec3 colourFor(float t) {
   float scaled = clamp(t, 0.0, 1.0) * 4.0;
   if (scaled < 1.0) return mix(stops[0], stops[1], scaled);
@@ -65,6 +87,9 @@ vec3 colourFor(float t) {
 void main() {
   float share = logarithmic > 0.5 ? log(vValue / low) / log(red / low) : (vValue - low) / max(red - low, 1e-30);
   vec3 colour = colourful > 0.5 ? colourFor(red > low ? share : 0.0) : plain;
+#ifdef TEXTURED
+  colour *= texture2D(image, vPlace).rgb;
+#endif
 #ifdef PER_VERTEX
   vec2 brightness = vLit;
 #else
@@ -72,6 +97,12 @@ void main() {
   vec2 brightness = lit(normal, normalize(vToEye));
 #ifdef BY_NORMAL
   colour = 0.5 + 0.5 * normal;
+#endif
+#ifdef CLAY
+  vec3 toEye = normalize(vToEye);
+  vec3 right = normalize(vec3(toEye.z, 0.0, -toEye.x));
+  colour = clayAt(vec3(dot(normal, right), dot(normal, cross(toEye, right)), dot(normal, toEye)));
+  brightness = vec2(1.0, 0.0);
 #endif
 #endif
   gl_FragColor = vec4(colour * (gl_FrontFacing ? brightness.x : 0.55 * brightness.x) + brightness.y, 1.0);
@@ -102,9 +133,10 @@ export function surfaceMaterial(isPerVertex: boolean, isClosed: boolean, ahead: 
   });
 }
 
-/** Colours by normals, or by values again. */
-export function colourByNormal(material: three.ShaderMaterial, isOn: boolean, isPerVertex: boolean): void {
-  const defines = isOn ? { BY_NORMAL: "" } : isPerVertex ? { PER_VERTEX: "" } : {};
+/** Colours by what is known for each pixel: by normals, or as clay; otherwise by values. */
+export function colourByPixel(material: three.ShaderMaterial, by: ColourBy, isPerVertex: boolean): void {
+  const own = by === "normals" ? { BY_NORMAL: "" } : by === "clay" ? { CLAY: "" } : undefined;
+  const defines = own ?? (isPerVertex ? { PER_VERTEX: "" } : {});
   if (JSON.stringify(defines) === JSON.stringify(material.defines)) return;
   material.defines = defines;
   material.needsUpdate = true;

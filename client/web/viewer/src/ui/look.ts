@@ -17,6 +17,8 @@ export function lookPanel(app: App): HTMLElement {
       ["p", "p"],
       ["stiffness", "Stiffness"],
       ["normals", "Normals"],
+      ["clay", "Clay"],
+      ["texture", "Texture"],
       ["plain", "Plain"],
     ],
     (colourBy) => app.view.set({ colourBy }),
@@ -36,12 +38,18 @@ export function lookPanel(app: App): HTMLElement {
     (isOn) => app.view.set({ hasReadout: isOn }),
     "Distortion and p of the vertex under the pointer, or under the cross (V)",
   );
+  const parallel = toggle(
+    "Parallel",
+    false,
+    (isOn) => app.view.set({ isParallel: isOn }),
+    "Without perspective: what is farther away is as large (Q)",
+  );
   const palette = paletteChoice(app);
   const encoding = el("select", { aria: { label: "How frames are sent" } });
   for (const [value, text] of [
-    ["float32", "exact, 16 bytes per vertex"],
-    ["quantized", "16 bits, 8 bytes per vertex"],
-    ["compressed", "compressed, about 3 bytes"],
+    ["float32", "exact, 16 B a vertex"],
+    ["quantized", "16 bits, 8 B a vertex"],
+    ["compressed", "compressed, about 3 B"],
   ]) {
     encoding.append(el("option", { value: value!, textContent: text! }));
   }
@@ -53,13 +61,22 @@ export function lookPanel(app: App): HTMLElement {
     pin.input.checked = view.pinned !== undefined;
     up.input.checked = view.isYUp;
     readout.input.checked = view.hasReadout;
+    parallel.input.checked = view.isParallel;
     encoding.value = view.encoding;
   });
+  const texture = colour.element.querySelector<HTMLButtonElement>('[data-value="texture"]')!;
+  app.facts.watch(
+    ({ mesh }) => [mesh],
+    () => {
+      texture.disabled = !app.isTextured;
+      texture.title = app.isTextured ? "" : "A GLB or glTF with materials has textures";
+    },
+  );
   return el(
     "div",
     { className: "look" },
     colour.element,
-    el("div", { className: "toggles" }, wireframe.element, ghost.element, pin.element, up.element, readout.element),
+    el("div", { className: "toggles" }, ...[wireframe, ghost, pin, up, readout, parallel].map(({ element }) => element)),
     axisButtons(app),
     palette,
     el("label", { className: "pair" }, el("span", {}, "Frames"), encoding),

@@ -56,22 +56,19 @@ export function measures(app: App): HTMLElement {
   );
   let last = -Infinity;
   let timer: ReturnType<typeof setTimeout> | undefined;
+  let later: ReturnType<typeof setTimeout> | undefined;
   const show = () => {
-    timer = undefined;
+    for (const one of [timer, later]) clearTimeout(one);
+    timer = later = undefined;
     last = performance.now();
     if (element.offsetParent === null) return;
     showNumbers(app, values, last);
     showPlots(app, energy, histograms);
-    if (app.panes.some(({ live }) => live && live.meter.framesPerSecond(last) > 0)) timer = setTimeout(show, 500);
+    if (app.panes.some(({ live }) => live && live.meter.framesPerSecond(last) > 0)) later = setTimeout(show, 500);
   };
+  /** In a task of its own, so that the task of a picture is short. */
   const soon = () => {
-    const wait = last + plotEveryMs - performance.now();
-    if (wait <= 0) {
-      clearTimeout(timer);
-      show();
-    } else {
-      timer ??= setTimeout(show, wait);
-    }
+    timer ??= setTimeout(show, last + plotEveryMs - performance.now());
   };
   app.afterDrawing.add(soon);
   app.view.watchAll(soon);

@@ -60,7 +60,8 @@ export function messages(app: App, startOver: () => void): HTMLElement {
   const showHint = () => {
     const { restoredFrom, setAside } = app.facts.now;
     setText(hint, hintOf(app));
-    hint.hidden = hint.textContent === "" || !banner.hidden || restoredFrom !== undefined || setAside.length > 0;
+    hint.hidden =
+      app.isWatching || hint.textContent === "" || !banner.hidden || restoredFrom !== undefined || setAside.length > 0;
   };
   app.facts.watch(
     ({ status, problem }) => [status, problem],

@@ -3,7 +3,7 @@ import { anchorOfHandle, changeHandle, type Document, type Handle, handleOf, shi
 import { fromEuler, toEuler } from "../model/euler.js";
 import { kindOf } from "../model/hold_kinds.js";
 import type { Vector3 } from "../model/mesh.js";
-import { subtract } from "../model/pose.js";
+import { leastScale, mostScale, noScale, scaled, subtract } from "../model/pose.js";
 import { el } from "./dom.js";
 import { type NumberField, numberField } from "./number_field.js";
 
@@ -60,6 +60,17 @@ export function poseFields(app: App): HTMLElement {
       return changeHandle(app.document, handle.name, { pose: { ...handle.pose, rotation: fromEuler(angles) } });
     },
   );
+  const scaleFields = row(
+    "Scaled along",
+    (axis) => `How much larger the handle is along its own ${axis} axis; 1: as at rest`,
+    () => 0.01,
+    [leastScale, mostScale],
+    (handle, axis, value) => {
+      const scale = [...(handle.pose.scale ?? noScale)] as [number, number, number];
+      scale[axis] = value;
+      return changeHandle(app.document, handle.name, { pose: scaled(handle.pose, scale) });
+    },
+  );
   const element = el(
     "div",
     { className: "pose" },
@@ -69,6 +80,8 @@ export function poseFields(app: App): HTMLElement {
     ...moved.map(({ element }) => element),
     el("span", {}, "Turned °"),
     ...turned.map(({ element }) => element),
+    el("span", {}, "Scaled"),
+    ...scaleFields.map(({ element }) => element),
   );
   const show = () => {
     const handle = selected();
@@ -77,6 +90,7 @@ export function poseFields(app: App): HTMLElement {
     const { isLocked, hold, targets, pose } = handle;
     showAll(moved, movementOf(handle), isLocked || kindOf(hold).isTurnedOnly);
     showAll(turned, toEuler(pose.rotation), isLocked || targets !== undefined);
+    showAll(scaleFields, pose.scale ?? noScale, isLocked || targets !== undefined || kindOf(hold).isTurnedOnly);
   };
   app.facts.watch(({ document }) => [document.handles], show);
   app.view.watch(({ selected }) => [selected], show);

@@ -37,7 +37,7 @@ function row(app: App, pose: KeyPose): HTMLElement {
   const { name } = pose;
   const others = () => (app.document.keyPoses ?? []).filter((one) => one.name !== name);
   const go = el("button", { type: "button", className: "plain", textContent: name, title: `Go to ${name}` });
-  go.addEventListener("click", () => app.change(atPose(app.document, pose)));
+  go.addEventListener("click", () => app.change(atPose(app.document, pose), true));
   const remove = button("trash", `Delete ${name}`, () => app.change({ ...app.document, keyPoses: others() }));
   return el("li", {}, go, remove);
 }

@@ -2,11 +2,11 @@ import type { App } from "../app/app.js";
 import { withoutPaint } from "../model/document.js";
 import { nothing } from "../model/pointed.js";
 import type { PaintMode } from "../model/soft_paint.js";
-import type { StrokeMode, Tool } from "../model/view.js";
+import type { GizmoMode, StrokeMode, Tool } from "../model/view.js";
 import { short } from "../model/words.js";
 import { choice, el, measured, toggle } from "./dom.js";
 import { button, slider } from "./controls.js";
-import { gizmoOptions } from "./gizmo_options.js";
+import { gizmoOptions, symmetryChoice } from "./gizmo_options.js";
 import { type IconName, icon } from "./icons.js";
 
 const tools: readonly (readonly [Tool, IconName, string, string])[] = [
@@ -48,11 +48,12 @@ function options(app: App): HTMLElement {
     ],
     (chosen) => app.view.set({ mode: chosen }),
   );
-  const gizmo = choice<"translate" | "rotate">(
-    "Arrows or rings",
+  const gizmo = choice<GizmoMode>(
+    "Arrows, rings or cubes",
     [
       ["translate", "Move"],
       ["rotate", "Turn"],
+      ["scale", "Scale"],
     ],
     (chosen) => app.view.set({ gizmo: chosen }),
   );
@@ -103,6 +104,7 @@ function options(app: App): HTMLElement {
     p.element,
     stiffness.element,
     through.element,
+    symmetryChoice(app),
     clear,
   );
 

@@ -5,6 +5,7 @@ import { el, setText } from "./dom.js";
 import { icon, type IconName } from "./icons.js";
 import { menu } from "./menu.js";
 import { button } from "./controls.js";
+import { shareLink } from "./share.js";
 
 /** The name, opening, undo, and actions on the whole work. */
 export function topbar(app: App, files: Files, showHelp: () => void): HTMLElement {
@@ -56,20 +57,20 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
   return el(
     "header",
     { className: "topbar" },
-    el("h1", { aria: { label: "lpdeform" } }, logo(), el("span", {}, "lpdeform")),
+    title(),
     el("div", { className: "cluster" }, shapes, details),
     open,
     el("div", { className: "cluster" }, undo, redo),
     el("span", { className: "space" }),
     split,
-    exportMenu(files),
+    exportMenu(app, files),
     theme,
     button("help", "Help and shortcuts (?)", showHelp),
     panel,
   );
 }
 
-function exportMenu(files: Files): HTMLElement {
+function exportMenu(app: App, files: Files): HTMLElement {
   return menu(icon("save"), "Save", "Save or export", [
     ["Project, to go on with (Ctrl+S)", () => void files.saveProject()],
     ["Mesh as PLY, with distortion", () => void files.exportMesh("ply")],
@@ -78,7 +79,10 @@ function exportMenu(files: Files): HTMLElement {
     ["Mesh as OFF", () => void files.exportMesh("off")],
     ["Mesh as STL", () => void files.exportMesh("stl")],
     ["Picture as PNG", () => files.exportPicture()],
+    ["Poses as GLB, with morph targets", () => void files.exportPoses("glb")],
+    ["Poses as video", () => void files.exportPoses("video")],
     ["Handles as JSON", () => files.saveHandles()],
+    ["Link to watch live", () => shareLink(app)],
   ]);
 }
 
@@ -88,6 +92,11 @@ function labelled(name: IconName, text: string, title: string, pressed: () => vo
   element.append(el("span", {}, text));
   element.setAttribute("aria-label", text);
   return element;
+}
+
+/** The name of the page. */
+export function title(): HTMLElement {
+  return el("h1", { aria: { label: "lpdeform" } }, logo(), el("span", {}, "lpdeform"));
 }
 
 function logo(): Node {

@@ -1,29 +1,16 @@
-import { join } from "node:path";
-import { afterAll, afterEach, beforeAll, beforeEach, expect, it } from "vitest";
-import { Service } from "../../../client/test/support/service.js";
-import { User } from "./user.js";
+import { beforeEach, expect, it } from "vitest";
+import { bar, withNewUsers } from "./opened.js";
+import type { User } from "./user.js";
 
-let service: Service;
 let user: User;
 
-beforeAll(async () => {
-  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
-});
-
-afterAll(() => service.stop());
+withNewUsers(bar, (one) => (user = one));
 
 beforeEach(async () => {
-  user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
-  await user.settled();
   const [vertex] = await user.ask<number[]>("document().handles[1].vertices");
   await user.drag(await user.vertexOnPage(vertex!), 120, 60);
   await user.settled();
   await user.page.getByText("Blend through p").click();
-});
-
-afterEach(async () => {
-  expect(user.errors).toEqual([]);
-  await user.close();
 });
 
 const status = () => user.page.locator(".blend [role=status]");

@@ -109,6 +109,31 @@ function covering(): string[] {
   return found;
 }
 
+/** Choices that are wider than their list is, by name. */
+function cutOff(): string[] {
+  const arrow = 20;
+  const context = document.createElement("canvas").getContext("2d")!;
+  return [...document.querySelectorAll("select")].flatMap((list) => {
+    if (!list.checkVisibility()) return [];
+    const { font, paddingLeft, paddingRight } = getComputedStyle(list);
+    context.font = font;
+    const room = list.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight) - arrow;
+    const widths = [...list.options].map(({ text }) => context.measureText(text).width);
+    return Math.max(...widths) > room ? [`${list.ariaLabel ?? list.title} by ${Math.max(...widths) - room}`] : [];
+  });
+}
+
+it.each([
+  [1280, 800],
+  [1920, 1080],
+])("every choice can be read whole at %d x %d", async (width, height) => {
+  await user.page.setViewportSize({ width, height });
+  for (const tool of ["move", "paint"]) {
+    await user.ask(`app.view.set({ isSplit: false, isPanelOpen: true, tool: "${tool}" })`);
+    expect(await user.page.evaluate(cutOff)).toEqual([]);
+  }
+});
+
 it.each(sizes)("nothing covers the first shape at %d x %d, and the hint is there", async (width, height) => {
   await user.page.setViewportSize({ width, height });
   const found: Record<string, string[]> = {};

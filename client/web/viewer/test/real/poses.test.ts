@@ -1,26 +1,13 @@
-import { join } from "node:path";
-import { afterAll, afterEach, beforeAll, beforeEach, expect, it } from "vitest";
-import { Service } from "../../../client/test/support/service.js";
-import { User } from "./user.js";
+import { beforeEach, expect, it } from "vitest";
+import { bar, withNewUsers } from "./opened.js";
+import type { User } from "./user.js";
 
-let service: Service;
 let user: User;
 
-beforeAll(async () => {
-  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
-});
-
-afterAll(() => service.stop());
+withNewUsers(bar, (one) => (user = one));
 
 beforeEach(async () => {
-  user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
-  await user.settled();
   await user.page.locator("summary", { hasText: "Poses" }).click();
-});
-
-afterEach(async () => {
-  expect(user.errors).toEqual([]);
-  await user.close();
 });
 
 const button = (name: string) => user.page.getByRole("button", { name, exact: true });

@@ -1,28 +1,20 @@
-import { join } from "node:path";
-import { afterAll, beforeAll, expect, it } from "vitest";
-import { Service } from "../../../client/test/support/service.js";
+import { beforeAll, expect, it } from "vitest";
 import { readOff, writeOff } from "../../src/io/off.js";
 import { splitTube } from "../split_tube.js";
-import { User } from "./user.js";
+import { withUser } from "./opened.js";
+import type { User } from "./user.js";
 
 const [columns, rows] = [16, 10];
 const tube = splitTube(columns, rows);
 const vertexCount = tube.positions.length / 3;
 const ring = (row: number) => Array.from({ length: columns + 1 }, (_, column) => row * (columns + 1) + column);
 
-let service: Service;
 let user: User;
 
-beforeAll(async () => {
-  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
-  user = await User.open(`${service.url}/?shape=bar&detail=coarse&encoding=float32`);
-  await user.settled();
-  await user.openFiles({ name: "tube.off", content: writeOff(tube) });
-});
+withUser("/?shape=bar&detail=coarse&encoding=float32", (one) => (user = one));
 
-afterAll(async () => {
-  await user.close();
-  await service.stop();
+beforeAll(async () => {
+  await user.openFiles({ name: "tube.off", content: writeOff(tube) });
 });
 
 /** The largest distance of vertices that were in one place. */

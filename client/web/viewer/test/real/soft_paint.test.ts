@@ -1,26 +1,10 @@
-import { join } from "node:path";
-import { afterAll, afterEach, beforeAll, beforeEach, expect, it } from "vitest";
-import { Service } from "../../../client/test/support/service.js";
-import { User } from "./user.js";
+import { expect, it } from "vitest";
+import { withNewUsers } from "./opened.js";
+import type { User } from "./user.js";
 
-let service: Service;
 let user: User;
 
-beforeAll(async () => {
-  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
-});
-
-afterAll(() => service.stop());
-
-beforeEach(async () => {
-  user = await User.open(`${service.url}/?shape=bar&detail=medium`);
-  await user.settled();
-});
-
-afterEach(async () => {
-  expect(user.errors).toEqual([]);
-  await user.close();
-});
+withNewUsers("/?shape=bar&detail=medium", (one) => (user = one));
 
 /** The painted values that differ, rising. */
 const painted = async () => {

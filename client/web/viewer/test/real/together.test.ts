@@ -1,28 +1,15 @@
-import { join } from "node:path";
-import { afterAll, afterEach, beforeAll, beforeEach, expect, it } from "vitest";
-import { Service } from "../../../client/test/support/service.js";
-import { User } from "./user.js";
+import { beforeEach, expect, it } from "vitest";
+import { withNewUsers } from "./opened.js";
+import type { User } from "./user.js";
 
-let service: Service;
 let user: User;
 
-beforeAll(async () => {
-  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
-});
-
-afterAll(() => service.stop());
+withNewUsers("/?shape=creature&detail=coarse", (one) => (user = one));
 
 /** The creature has feet, which are locked, a tail, and a head. */
 beforeEach(async () => {
-  user = await User.open(`${service.url}/?shape=creature&detail=coarse`);
-  await user.settled();
   await user.page.locator('[data-handle="Head"] .name').click();
   await user.page.locator("canvas.stage").focus();
-});
-
-afterEach(async () => {
-  expect(user.errors).toEqual([]);
-  await user.close();
 });
 
 interface Moved {

@@ -1,21 +1,10 @@
-import { join } from "node:path";
-import { afterAll, beforeAll, expect, it } from "vitest";
-import { Service } from "../../../client/test/support/service.js";
+import { expect, it } from "vitest";
+import { bar, withUser } from "./opened.js";
 import { decodePng, User } from "./user.js";
 
-let service: Service;
 let user: User;
 
-beforeAll(async () => {
-  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
-  user = await User.open(`${service.url}/?shape=bar&detail=coarse`, { width: 820, height: 1180, hasTouch: true });
-  await user.settled();
-});
-
-afterAll(async () => {
-  await user.close();
-  await service.stop();
-});
+withUser(bar, (one) => (user = one), { width: 820, height: 1180, hasTouch: true });
 
 type Point = { x: number; y: number };
 

@@ -128,7 +128,7 @@ export class User {
 
   async save(entry: string): Promise<Buffer> {
     await this.page.getByRole("button", { name: "Save" }).click();
-    const download = this.page.waitForEvent("download");
+    const download = this.page.waitForEvent("download", { timeout: 60_000 });
     await this.page.getByRole("menuitem", { name: entry }).click();
     return readFileSync(await ((await download) as Download).path());
   }

@@ -1,22 +1,10 @@
-import { join } from "node:path";
-import { afterAll, beforeAll, expect, it } from "vitest";
-import { Service } from "../../../client/test/support/service.js";
-import { User } from "./user.js";
+import { expect, it } from "vitest";
+import { bar, withUser } from "./opened.js";
+import type { User } from "./user.js";
 
-let service: Service;
 let user: User;
 
-beforeAll(async () => {
-  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
-  user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
-  await user.settled();
-});
-
-afterAll(async () => {
-  expect(user.errors).toEqual([]);
-  await user.close();
-  await service.stop();
-});
+withUser(bar, (one) => (user = one));
 
 it("warnings about a mesh are in sight as soon as it is open, at 1280 x 800", async () => {
   // Two tetrahedra that share nothing but a vertex.

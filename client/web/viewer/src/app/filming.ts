@@ -1,0 +1,149 @@
+import { morphGlb } from "../io/gltf_morphs.js";
+import { shapesOf } from "../link/prepare.js";
+import { shownOf } from "../model/derived.js";
+import type { Shape } from "../model/blend.js";
+import { type Moment, momentsOf, shapeAt } from "../model/film.js";
+import { DrawMesh } from "../stage/drawmesh.js";
+import type { App } from "./app.js";
+import { secondsEach } from "./player.js";
+
+/** Shapes that are solved from one pose to the next. */
+const steps = 6;
+/** Of all shapes of a film. */
+const mostBytes = 500e6;
+const bytesEach = 24;
+/** How long a video stays at its first and last picture. */
+const restSeconds = 0.4;
+const formats = ["video/webm;codecs=vp9", "video/webm", "video/mp4"];
+
+export interface Film {
+  moments: readonly Moment[];
+  shapes: readonly Shape[];
+}
+
+/**
+ * Solves for the poses and for what is between them, in a session of its own. Undefined if there are no two poses, which the user is
+ * told, or if the work changes meanwhile. Rejects with an LpdeformError.
+ */
+async function film(app: App): Promise<Film | undefined> {
+  const { mesh, document, seams } = app;
+  const poses = document.keyPoses?.length ?? 0;
+  if (poses < 2) {
+    app.notify("There is nothing to film before there are two poses: “Keep this pose” in the panel “Poses”.", true);
+    return undefined;
+  }
+  const room = Math.floor(mostBytes / ((bytesEach * mesh.positions.length) / 3) / poses);
+  const moments = momentsOf(document, Math.min(steps, Math.max(room, 1)));
+  const shapes: Shape[] = [];
+  const say = () => app.notifyWhile(`Solving for the poses: ${shapes.length + 1} of ${moments.length}…`);
+  let done = say();
+  try {
+    const documents = moments.map((moment) => moment.document);
+    for await (const shape of shapesOf(mesh, documents, seams?.groups, new AbortController().signal)) {
+      if (app.mesh !== mesh || app.document !== document) {
+        app.notify("The work has changed: the poses were not exported.", true);
+        return undefined;
+      }
+      shapes.push(shape);
+      if (shapes.length < moments.length) done = say();
+    }
+    return { moments, shapes };
+  } finally {
+    done();
+  }
+}
+
+/** The poses as a GLB with morph targets and an animation through them, shaded as on the page. */
+export async function posesAsGlb(app: App): Promise<Uint8Array<ArrayBuffer> | undefined> {
+  const { mesh, seams } = app;
+  const made = await film(app);
+  if (!made) return undefined;
+  const { moments, shapes } = made;
+  const faces = seams?.faces ?? mesh.faces;
+  const draw = new DrawMesh({ positions: mesh.positions, faces }, shownOf(mesh, faces).drawn);
+  const stills = shapes.map(({ positions }, k) => {
+    draw.take(positions);
+    return { name: moments[k]!.name, positions: draw.positions.slice(), normals: draw.normals.slice() };
+  });
+  return morphGlb(mesh.name, draw.indices, stills, (secondsEach * (app.document.keyPoses!.length - 1)) / (stills.length - 1));
+}
+
+/** The poses as a video of the first picture, as it looks. Undefined if this browser records none, or as film(). */
+export async function posesAsVideo(app: App): Promise<Blob | undefined> {
+  const mimeType = formats.find((format) => globalThis.MediaRecorder?.isTypeSupported(format));
+  if (!mimeType) {
+    app.notify("This browser records no videos.", true);
+    return undefined;
+  }
+  const made = await film(app);
+  if (!made) return undefined;
+  const { mesh } = app;
+  const { selected, alsoSelected } = app.view.now;
+  const done = app.notifyWhile("Recording the poses…");
+  app.view.set({ selected: undefined });
+  try {
+    return await recorded(app, made.shapes, mimeType);
+  } finally {
+    done();
+    app.endPreview(false);
+    if (app.mesh === mesh) app.view.set({ selected, alsoSelected });
+  }
+}
+
+/**
+ * Shows the shapes one after the other, and records a copy of each picture: the size of the stage's own changes if drawing is slow.
+ */
+async function recorded(app: App, shapes: readonly Shape[], mimeType: string): Promise<Blob> {
+  const { stage } = app.panes[0]!;
+  const canvas = document.createElement("canvas");
+  const ratio = Math.min(devicePixelRatio, 2);
+  [canvas.width, canvas.height] = [stage.width, stage.height].map((size) => 2 * Math.round((size * ratio) / 2)) as [
+    number,
+    number,
+  ];
+  const context = canvas.getContext("2d")!;
+  const copy = () => context.drawImage(stage.canvas, 0, 0, canvas.width, canvas.height);
+  app.afterDrawing.add(copy);
+  const stream = canvas.captureStream(60);
+  const recorder = new MediaRecorder(stream, { mimeType, videoBitsPerSecond: 12e6 });
+  const parts: Blob[] = [];
+  recorder.ondataavailable = ({ data }) => parts.push(data);
+  const stopped = new Promise((resolve) => (recorder.onstop = resolve));
+  try {
+    app.preview(shapes[0]!);
+    await nextPicture(app);
+    recorder.start();
+    await play(app, shapes, (app.document.keyPoses!.length - 1) * secondsEach);
+    recorder.stop();
+    await stopped;
+  } finally {
+    app.afterDrawing.delete(copy);
+    for (const track of stream.getTracks()) track.stop();
+  }
+  return new Blob(parts, { type: mimeType });
+}
+
+function nextPicture(app: App): Promise<void> {
+  return new Promise((resolve) => {
+    const drawn = () => {
+      app.afterDrawing.delete(drawn);
+      resolve();
+    };
+    app.afterDrawing.add(drawn);
+  });
+}
+
+/** With pictures at rest before and after. Ends early if another mesh is opened. */
+function play(app: App, shapes: readonly Shape[], seconds: number): Promise<void> {
+  const { mesh } = app;
+  const begin = performance.now();
+  return new Promise((resolve) => {
+    const step = (now: number) => {
+      const at = (now - begin) / 1000 - restSeconds;
+      if (at > seconds + restSeconds || app.mesh !== mesh) return resolve();
+      app.preview(shapeAt(shapes, (at / seconds) * (shapes.length - 1)));
+      requestAnimationFrame(step);
+    };
+    step(begin);
+  });
+}

@@ -1,0 +1,38 @@
+import type { App } from "../app/app.js";
+import { linkTo } from "../link/watched.js";
+import { el, setText } from "./dom.js";
+
+/** Shows the link by which others watch the first picture's session. */
+export function shareLink(app: App): void {
+  const session = app.panes[0]!.live?.sessionName;
+  if (!session) return app.notify("There is a link as soon as the server has the shape.", true);
+  const link = el("input", { type: "text", readOnly: true, value: linkTo(session, location.href), aria: { label: "Link" } });
+  const copy = el("button", { type: "button", className: "plain", textContent: "Copy the link" });
+  const close = el("button", { type: "button", className: "plain", textContent: "Close" });
+  const sheet = el(
+    "dialog",
+    { className: "help share", aria: { label: "Watch live" } },
+    el("h2", {}, "Watch live"),
+    el(
+      "p",
+      {},
+      "Whoever opens this link sees the shape as you change it, and turns it as they like. Whoever knows it can also change the session by " +
+        "other programs, so give it to people whom you trust. It ends when you close this page or open another shape.",
+    ),
+    link,
+    el("div", { className: "pose-actions" }, copy, close),
+  );
+  copy.addEventListener("click", () => {
+    link.select();
+    // Pages that are not from a safe origin have no clipboard, but their users have.
+    void (navigator.clipboard?.writeText(link.value) ?? Promise.reject(new Error("no clipboard"))).then(
+      () => setText(copy, "Copied"),
+      () => setText(copy, "Press Ctrl+C to copy it"),
+    );
+  });
+  close.addEventListener("click", () => sheet.close());
+  sheet.addEventListener("close", () => sheet.remove());
+  document.querySelector("#app")!.append(sheet);
+  sheet.showModal();
+  link.select();
+}

@@ -1,0 +1,91 @@
+import { writeFileSync } from "node:fs";
+import { beforeAll, expect, it } from "vitest";
+import { readGltfDocument } from "../../src/io/gltf_document.js";
+import { faultsOf } from "../gltf_validator.js";
+import { bar, withUser } from "./opened.js";
+import type { User } from "./user.js";
+
+let user: User;
+withUser(bar, (one) => (user = one));
+
+beforeAll(async () => {
+  await user.page.locator("summary", { hasText: "Poses" }).click();
+});
+
+const keep = () => user.page.getByRole("button", { name: "Keep this pose" }).click();
+
+it("without two poses there is nothing to export, which is said", async () => {
+  await keep();
+  await user.page.getByRole("button", { name: "Save" }).click();
+  await user.page.getByRole("menuitem", { name: "Poses as video" }).click();
+  await user.page.locator(".notice.bad", { hasText: "two poses" }).waitFor();
+});
+
+it("poses are exported as morph targets, solved in between, and validated", async () => {
+  const [vertex] = await user.ask<number[]>("document().handles[1].vertices");
+  await user.drag(await user.vertexOnPage(vertex!), 150, 60);
+  await keep();
+  await user.settled();
+  const glb = await user.save("Poses as GLB, with morph targets");
+  if (process.env["SHOT"]) writeFileSync(`${process.env["SHOT"]}.glb`, glb);
+  expect(await faultsOf(new Uint8Array(glb))).toEqual([]);
+  const { json } = readGltfDocument("a.glb", new Uint8Array(glb), new Map());
+  const [{ primitives, extras }] = json["meshes"] as [{ primitives: [{ targets: { POSITION: number }[] }]; extras: object }];
+  expect(extras).toMatchObject({ targetNames: expect.arrayContaining(["Pose 1 to Pose 2, 50 %", "Pose 2"]) });
+  const accessors = json["accessors"] as { max: number[] }[];
+  const farthest = primitives[0].targets.map(({ POSITION }) => accessors[POSITION]!.max[0]!);
+  expect(farthest).toEqual([...farthest].sort((a, b) => a - b));
+  expect(farthest.at(-1)).toBeGreaterThan(0.5);
+});
+
+it("poses are recorded as a video of the picture, whose last picture is the last pose", async () => {
+  const before = await user.ask<string | undefined>("app.view.now.selected");
+  const video = await user.save("Poses as video");
+  if (process.env["SHOT"]) writeFileSync(`${process.env["SHOT"]}.webm`, video);
+  expect(video.readUInt32BE(0)).toBe(0x1a45dfa3); // how WebM files begin
+  const pictures = await user.page.evaluate(async (base64) => {
+    const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+    const element = document.createElement("video");
+    element.muted = true;
+    element.src = URL.createObjectURL(new Blob([bytes], { type: "video/webm" }));
+    await new Promise((resolve, reject) => {
+      element.onloadeddata = resolve;
+      element.onerror = () => reject(new Error("the video cannot be played"));
+    });
+    const { videoWidth: width, videoHeight: height } = element;
+    const canvas = new OffscreenCanvas(width, height);
+    const context = canvas.getContext("2d")!;
+    /** The mean x of what is colourful. */
+    const middle = () => {
+      context.drawImage(element, 0, 0);
+      const { data } = context.getImageData(0, 0, width, height);
+      let [sum, count] = [0, 0];
+      for (let at = 0; at < data.length; at += 4) {
+        const [r, g, b] = [data[at]!, data[at + 1]!, data[at + 2]!];
+        if (Math.max(r, g, b) - Math.min(r, g, b) < 70) continue;
+        sum += (at / 4) % width;
+        ++count;
+      }
+      return sum / count;
+    };
+    const middles: number[] = [];
+    const each = () => {
+      middles.push(middle());
+      element.requestVideoFrameCallback(each);
+    };
+    element.requestVideoFrameCallback(each);
+    await new Promise((resolve) => {
+      element.onended = resolve;
+      void element.play();
+    });
+    return { width, height, middles, seconds: element.currentTime };
+  }, video.toString("base64"));
+  expect(pictures.seconds).toBeGreaterThan(1.5);
+  const { middles } = pictures;
+  expect(middles.length).toBeGreaterThan(5);
+  expect(middles.every((middle) => middle > 0)).toBe(true); // no picture is empty
+  expect(middles.at(-1)).toBeGreaterThan(middles[0]! + 20);
+  const size = await user.page.locator("canvas.stage").evaluate((canvas) => (canvas as HTMLCanvasElement).clientWidth);
+  expect(pictures.width).toBeGreaterThan(0.3 * size);
+  expect(await user.ask("app.view.now.selected")).toBe(before);
+});

@@ -1,0 +1,71 @@
+import { expect, it } from "vitest";
+import { columns, makeGlb } from "../made_glb.js";
+import { pngOf } from "../png.js";
+import { bar, withUser } from "./opened.js";
+import type { User } from "./user.js";
+
+let user: User;
+withUser(bar, (one) => (user = one));
+
+const button = (name: string) => user.page.getByRole("button", { name, exact: true });
+const isRed = ([r, g]: readonly number[]) => r! > 100 && g! < 60;
+const isGreen = ([r, g]: readonly number[]) => g! > 100 && r! < 60;
+
+it("clay is lit as seen by the viewer, and a mesh without materials has no texture to show", async () => {
+  expect(await button("Texture").isDisabled()).toBe(true);
+  await button("Clay").click();
+  await user.page.mouse.move(5, 400);
+  const place = await user.vertexOnPage(await user.vertexNear([0.5, 0, 2.5]));
+  await expect
+    .poll(
+      async () => {
+        const [r, g, b] = await user.colourAt(place);
+        return r > g && g > b;
+      },
+      { timeout: 20_000 },
+    )
+    .toBe(true);
+  expect(await user.page.locator(".legend").isHidden()).toBe(true);
+  if (process.env["SHOT"]) await user.page.screenshot({ path: `${process.env["SHOT"]}-clay.png` });
+  await user.page.locator("canvas.stage").focus();
+  await user.page.keyboard.press("c");
+  expect(await user.ask("app.view.now.colourBy")).toBe("plain");
+});
+
+it("the texture of a GLB is shown where the file has it, and bends with the surface", async () => {
+  const picture = pngOf(2, 1, [255, 0, 0, 0, 255, 0]);
+  await user.openFiles({ name: "tube.glb", content: Buffer.from(makeGlb(false, picture)) });
+  await user.until(`window.__lpdeform.app.mesh.name === "tube.glb"`);
+  await user.ask("app.view.set({ isYUp: true })");
+  await button("Texture").click();
+  const at = async (column: number) => user.vertexOnPage(8 * (columns + 1) + column);
+  await button("Front").click();
+  await user.page.mouse.move(5, 400);
+  await expect.poll(async () => isRed(await user.colourAt(await at(3))), { timeout: 20_000 }).toBe(true);
+  await button("Back").click();
+  await expect.poll(async () => isGreen(await user.colourAt(await at(9))), { timeout: 20_000 }).toBe(true);
+  await button("Front").click();
+  const top = Array.from({ length: columns + 1 }, (_, column) => 16 * (columns + 1) + column);
+  const bottom = Array.from({ length: columns + 1 }, (_, column) => column);
+  const handles = {
+    handles: [
+      { name: "base", vertices: bottom },
+      { name: "top", vertices: top, translate: [0, 0, 0] },
+    ],
+  };
+  await user.openFiles({ name: "h.json", content: JSON.stringify(handles) });
+  await user.settled();
+  const before = await at(3);
+  await user.page.locator('[data-handle="top"] .name').click();
+  await user.page.getByLabel("Moved along x").fill("1.5");
+  await user.page.getByLabel("Moved along x").press("Enter");
+  await user.settled();
+  await user.ask("app.view.set({ selected: undefined })");
+  await user.page.mouse.move(5, 400);
+  const after = await at(3);
+  expect(after.x).toBeGreaterThan(before.x + 20);
+  await expect.poll(async () => isRed(await user.colourAt(after)), { timeout: 20_000 }).toBe(true);
+  if (process.env["SHOT"]) await user.page.screenshot({ path: `${process.env["SHOT"]}-texture.png` });
+  await button("Distortion").click();
+  await expect.poll(async () => isRed(await user.colourAt(after)), { timeout: 20_000 }).toBe(false);
+});
