@@ -3,7 +3,9 @@
 #include "core/energy/rotation_fit.h"
 
 // This file is compiled once for each instruction set. The first call decides which version runs.
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+// SVE is left out: its vectors can be no members and no elements of arrays.
+#define HWY_DISABLED_TARGETS \
+  (HWY_SSSE3 | HWY_AVX3_DL | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #define HWY_TARGET_INCLUDE "core/energy/cell_kernel.cc"
 #include <hwy/foreach_target.h>
 
