@@ -68,7 +68,7 @@ void prepare_grpc() {
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     // Reflection lists the health service, but can describe only what is linked into the program.
-    grpc::health::v1::HealthCheckRequest::descriptor();
+    static_cast<void>(grpc::health::v1::HealthCheckRequest::descriptor());
   });
 }
 
@@ -238,7 +238,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& given
   if (!listener.ok()) return listener.status();
   if (absl::Status status = check_anonymous(options, **listener); !status.ok()) return status;
   prepare_grpc();
-  if (options.log) take_grpc_log(options.log);
+  take_grpc_log(options.log);
   auto impl = std::make_unique<Impl>(options, *std::move(listener), *std::move(tokens));
   if (absl::Status status = impl->start_grpc(options, *certificates); !status.ok()) return status;
   impl->start_listening(options);

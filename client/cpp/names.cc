@@ -1,6 +1,10 @@
 #include "client/cpp/names.h"
 
+#ifdef LPDEFORM_HAS_UTF8_RANGE
+#include <utf8_validity.h>
+#else
 #include <google/protobuf/stubs/common.h>
+#endif
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
@@ -8,10 +12,20 @@
 #include "core/base/reasons.h"
 
 namespace lpdeform::client {
+namespace {
+
+bool is_utf8(std::string_view text) {
+#ifdef LPDEFORM_HAS_UTF8_RANGE
+  return utf8_range::IsStructurallyValid({text.data(), text.size()});
+#else
+  return google::protobuf::internal::IsStructurallyValidUTF8(text.data(), static_cast<int>(text.size()));
+#endif
+}
+
+}  // namespace
 
 absl::Status check_name(std::string_view what, std::string_view name) {
-  const int size = static_cast<int>(name.size());
-  if (google::protobuf::internal::IsStructurallyValidUTF8(name.data(), size)) return absl::OkStatus();
+  if (is_utf8(name)) return absl::OkStatus();
   const std::string kind(what);
   const std::string shown = absl::StrCat(kind, " \"", absl::CHexEscape(std::string(name)), "\"");
   return make_fault({Reason::kNameEncoding, shown, "UTF-8"},

@@ -15,23 +15,27 @@ namespace {
 /// which it does not check: if they are damaged, it accepts no connection.
 class FreshCredentials final : public grpc::ServerCredentials {
  public:
+#ifdef LPDEFORM_GRPC_HOLDS_CREDENTIALS
+  explicit FreshCredentials(std::shared_ptr<Certificates> certificates)
+      : grpc::ServerCredentials(create(certificates->knows_clients(), this)),
+        certificates_(std::move(certificates)) {}
+#else
   explicit FreshCredentials(std::shared_ptr<Certificates> certificates)
       : certificates_(std::move(certificates)),
-        credentials_(grpc_ssl_server_credentials_create_with_options(
-                         grpc_ssl_server_credentials_create_options_using_config_fetcher(
-                             certificates_->knows_clients()
-                                 ? GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY
-                                 : GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE,
-                             fetch, this)),
-                     grpc_server_credentials_release) {}
+        credentials_(create(certificates_->knows_clients(), this), grpc_server_credentials_release) {}
+#endif
 
   void SetAuthMetadataProcessor(const std::shared_ptr<grpc::AuthMetadataProcessor>&) override {
     LPDEFORM_CHECK(!"calls are judged by Backend::identify");
   }
 
  private:
-  int AddPortToServer(const std::string& address, grpc_server* server) override {
-    return grpc_server_add_http2_port(server, address.c_str(), credentials_.get());
+  static grpc_server_credentials* create(bool knows_clients, FreshCredentials* self) {
+    return grpc_ssl_server_credentials_create_with_options(
+        grpc_ssl_server_credentials_create_options_using_config_fetcher(
+            knows_clients ? GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY
+                          : GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE,
+            fetch, self));
   }
 
   /// gRPC calls this for one connection at a time.
@@ -51,7 +55,13 @@ class FreshCredentials final : public grpc::ServerCredentials {
 
   const std::shared_ptr<Certificates> certificates_;
   std::uint64_t given_ = 0;
+
+#ifndef LPDEFORM_GRPC_HOLDS_CREDENTIALS
+  int AddPortToServer(const std::string& address, grpc_server* server) override {
+    return grpc_server_add_http2_port(server, address.c_str(), credentials_.get());
+  }
   const std::unique_ptr<grpc_server_credentials, decltype(&grpc_server_credentials_release)> credentials_;
+#endif
 };
 
 }  // namespace

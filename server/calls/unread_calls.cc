@@ -31,8 +31,10 @@ class Teller final : public Interceptor {
   void Intercept(InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
       const grpc::Status status = methods->GetSendStatus();
-      // This status is gRPC's own; those of this server have details.
-      if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED && status.error_details().empty()) {
+      // This status is gRPC's own, INTERNAL since later versions; those of this server have details.
+      const bool is_of_unread = status.error_code() == grpc::StatusCode::UNIMPLEMENTED ||
+                                status.error_code() == grpc::StatusCode::INTERNAL;
+      if (is_of_unread && status.error_details().empty()) {
         const absl::Status why = message_unreadable();
         backend_.begin_record(method_, {})->ended(why);
         methods->ModifySendStatus(to_grpc(why));

@@ -14,6 +14,10 @@ namespace {
 
 constexpr char kDomain[] = "lpdeform";
 
+void add_detail(const google::protobuf::Message& detail, google::rpc::Status& out) {
+  static_cast<void>(out.add_details()->PackFrom(detail));  // fails from 2 GiB on
+}
+
 std::string reason_of(const absl::Status& status, const Fault& fault) {
   return fault.reason.empty() ? absl::StatusCodeToString(status.code()) : fault.reason;
 }
@@ -24,7 +28,7 @@ void add_error_info(const absl::Status& status, const Fault& fault, google::rpc:
   info.set_domain(kDomain);
   if (!fault.element.empty()) (*info.mutable_metadata())["element"] = fault.element;
   if (!fault.limit.empty()) (*info.mutable_metadata())["limit"] = fault.limit;
-  out.add_details()->PackFrom(info);
+  add_detail(info, out);
 }
 
 void add_bad_request(const absl::Status& status, const Fault& fault, google::rpc::Status& out) {
@@ -32,7 +36,7 @@ void add_bad_request(const absl::Status& status, const Fault& fault, google::rpc
   auto& violation = *bad.add_field_violations();
   violation.set_field(fault.element);
   violation.set_description(std::string(status.message()));
-  out.add_details()->PackFrom(bad);
+  add_detail(bad, out);
 }
 
 void add_quota_failure(const absl::Status& status, const Fault& fault, google::rpc::Status& out) {
@@ -40,7 +44,7 @@ void add_quota_failure(const absl::Status& status, const Fault& fault, google::r
   auto& violation = *quota.add_violations();
   violation.set_subject(fault.element);
   violation.set_description(std::string(status.message()));
-  out.add_details()->PackFrom(quota);
+  add_detail(quota, out);
 }
 
 /// The type of the resource that was not found, by the beginning of the reason.
@@ -63,14 +67,14 @@ void add_resource_info(const absl::Status& status, const Fault& fault, google::r
   resource.set_resource_type(resource_type_of(fault.reason));
   resource.set_resource_name(fault.element);
   resource.set_description(std::string(status.message()));
-  out.add_details()->PackFrom(resource);
+  add_detail(resource, out);
 }
 
 void add_retry_info(std::uint32_t after_ms, google::rpc::Status& out) {
   google::rpc::RetryInfo retry;
   retry.mutable_retry_delay()->set_seconds(after_ms / 1000);
   retry.mutable_retry_delay()->set_nanos(static_cast<int>(after_ms % 1000) * 1'000'000);
-  out.add_details()->PackFrom(retry);
+  add_detail(retry, out);
 }
 
 }  // namespace

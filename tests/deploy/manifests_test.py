@@ -433,15 +433,23 @@ class Compose(unittest.TestCase):
                     self.assertTrue(shared, (name, argument))
 
 
-class Workflow(unittest.TestCase):
-    workflow = load(ROOT / ".github/workflows/ci.yaml")
+class Workflows(unittest.TestCase):
+    every = {path.name: load(path) for path in (ROOT / ".github/workflows").iterdir()}
 
-    def test_it_fits_the_schema(self):
-        # YAML 1.1 reads the key "on" as true.
-        check({("on" if key is True else key): value for key, value in self.workflow.items()}, "github-workflows")
+    def test_they_fit_the_schema(self):
+        for name, workflow in self.every.items():
+            with self.subTest(name):
+                # YAML 1.1 reads the key "on" as true.
+                check({("on" if key is True else key): value for key, value in workflow.items()}, "github-workflows")
 
-    def test_it_runs_what_every_change_has_to_pass(self):
-        steps = [step.get("run") for step in self.workflow["jobs"]["tests"]["steps"]]
+    def test_both_images_are_built_for_both_kinds_of_machine(self):
+        job = self.every["images.yaml"]["jobs"]["images"]
+        self.assertEqual({one["platform"] for one in job["strategy"]["matrix"]["include"]}, {"linux/amd64", "linux/arm64"})
+        builds = [step["run"] for step in job["steps"] if step.get("run", "").startswith("docker buildx build ")]
+        self.assertEqual([re.findall(r"--target (\S+)", build) for build in builds], [[], ["web"]])
+
+    def test_one_runs_what_every_change_has_to_pass(self):
+        steps = [step.get("run") for step in self.every["ci.yaml"]["jobs"]["tests"]["steps"]]
         command = re.search(r'/(tests/run)"(.*)', (ROOT / ".ci/run").read_text()).expand(r"\1\2")
         self.assertIn(command, steps)
 

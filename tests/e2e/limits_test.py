@@ -9,7 +9,7 @@ import urllib.request
 import programs
 
 ROOT = os.path.join(os.path.dirname(__file__), "..", "..")
-FLAG = re.compile(r"^  --([a-z-]+) \S.*?(?:=| \[)([^\s\]]+)\]? +\(Env:(\w+)\)$", re.MULTILINE)  # =DEFAULT, from CLI11 2.4 on [DEFAULT]
+FLAG = re.compile(r"^ +--([a-z-]+) \S.*?(?:=| \[)([^\s\]]+)\]? +\(Env:(\w+)\) *$", re.MULTILINE)  # =DEFAULT, from CLI11 2.4 on [DEFAULT]
 ROW = re.compile(r"^\| `--([a-z-]+)` \| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
 UNITS = {"KiB": 2**10, "MiB": 2**20, "GiB": 2**30, "s": 1, "": 1, "%": 0.01}
 NO_REASON = "-"

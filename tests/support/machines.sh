@@ -13,10 +13,18 @@ mirror() {
     sed -nE 's/^URIs: *([^ ]+).*/\1/p; s/^deb +(\[[^]]*\] +)?([^ ]+).*/\2/p' | grep -m 1 '/debian/\?$'
 }
 
-make_machine() {  # NAME, which is SUITE or SUITE-plain
+suite_of() {  # NAME, which is SUITE, SUITE-plain, newest or arm64
+  case $1 in
+    newest) echo sid ;;
+    arm64) echo trixie ;;
+    *) echo "${1%-plain}" ;;
+  esac
+}
+
+make_machine() {  # NAME
   local machine=$folder/$1 file
   if [ -e "$machine/.made" ]; then return; fi
-  debootstrap --variant=minbase --include=ca-certificates "${1%-plain}" "$machine" "$(mirror)"
+  debootstrap --variant=minbase --include=ca-certificates "$(suite_of "$1")" "$machine" "$(mirror)"
   mkdir -p "$machine/root/.config"
   for file in etc/apt/apt.conf.d etc/pip.conf etc/ssl/certs usr/local/share/ca-certificates root/.npmrc root/.config/pip; do
     [ ! -e "/$file" ] || cp -a "/$file" "$(dirname "$machine/$file")/"

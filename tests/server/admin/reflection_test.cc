@@ -24,7 +24,7 @@ std::vector<std::string> fields_of(const std::string& message, int number) {
   EXPECT_TRUE(fields.ParseFromString(message));
   std::vector<std::string> found;
   for (int k = 0; k < fields.field_count(); ++k) {
-    if (fields.field(k).number() == number) found.push_back(fields.field(k).length_delimited());
+    if (fields.field(k).number() == number) found.emplace_back(fields.field(k).length_delimited());
   }
   return found;
 }
