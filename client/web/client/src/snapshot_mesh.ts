@@ -17,7 +17,7 @@ export async function meshIn(file: Uint8Array): Promise<RestMesh> {
   if (file.byteLength < headerBytes) throw damaged();
   if (header.getUint32(8, true) > format) {
     const limit = `format <= ${format}`;
-    throw new LpdeformError("failed_precondition", "The server's snapshot has a later format than this client reads.", {
+    throw new LpdeformError("invalid_argument", "The server's snapshot has a later format than this client reads.", {
       reason: "SNAPSHOT_NEWER",
       element: "snapshot",
       limit,
@@ -53,7 +53,7 @@ function arraysOf(message: Uint8Array): RestMesh {
 }
 
 function damaged(): LpdeformError {
-  return new LpdeformError("data_loss", "The server's snapshot is damaged: its mesh cannot be read.", {
+  return new LpdeformError("invalid_argument", "The server's snapshot is damaged: its mesh cannot be read.", {
     reason: "SNAPSHOT_DAMAGED",
     element: "snapshot",
   });
