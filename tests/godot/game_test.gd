@@ -324,6 +324,7 @@ func measures_a_frame() -> void:
 		handle.hold = true
 	var shown := [0]
 	bar.deformed.connect(func() -> void: shown[0] += 1)
+	await until(func() -> bool: return shown[0] > 0, "the first frame comes")
 	var times: Array[int] = []
 	for frame in 300:
 		(bar.get_child(1) as LpdeformHandle).position.y = 0.5 * sin(0.05 * frame)

@@ -1,5 +1,7 @@
 """Solves frame after frame of the scene, and keeps the results as shape keys with keyframes, so that a render follows."""
 
+import time
+
 import bpy
 import numpy as np
 
@@ -9,6 +11,7 @@ from .client import NotReady
 _prefix = "lpdeform frame "
 _most_frames = 10_000  # Blender numbers the shape keys of an object by 16 bits
 _patience = 0.05  # seconds that a step waits
+_longest_start = 60  # seconds until the server has answered for the first time
 
 
 class Baking:
@@ -24,6 +27,7 @@ class Baking:
         self._name, self._frames, self._scene = ob.name, frames, bpy.context.scene
         self._before = self._scene.frame_current, self._scene.frame_subframe
         self._shapes: list = []
+        self._deadline = time.monotonic() + _longest_start
         running.is_baked = True
         self._scene.frame_set(frames[0])
 
@@ -44,7 +48,7 @@ class Baking:
         if running is None:
             raise NotReady("The mesh, or its session, is gone.")
         running.look(ob)
-        if running.frame is not None and running.state != "connected":
+        if running.state != "connected" and (running.frame is not None or time.monotonic() > self._deadline):
             raise NotReady(f"The server went away at frame {self._frames[self.done]}.")
         result = running.finished(ob, _patience)
         if result is not None:

@@ -1,6 +1,7 @@
 """The package lpdeform, if it can be imported, and the server's address."""
 
 import os
+import re
 
 import bpy
 
@@ -29,7 +30,7 @@ def require() -> None:
 
 
 def _is_on_this_machine(server: str) -> bool:
-    return server.startswith(("localhost:", "127.", "[::1]:", "unix:"))
+    return re.match(r"(localhost|127(\.\d+){3}|\[::1\]):|unix:", server) is not None
 
 
 def _preference(name: str):

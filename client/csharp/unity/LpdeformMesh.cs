@@ -24,7 +24,7 @@ public sealed class LpdeformMesh : MonoBehaviour
         [NonSerialized] public bool holds;
     }
 
-    public string address = "localhost:50051";
+    public string address = "localhost:8080";
     [Range(1, 8)] public float p = 2;
     public bool showDistortion = true;
     /// A shape of lower energy that the server finds while nothing moves is shown at once. Otherwise the log says that there is
@@ -59,15 +59,6 @@ public sealed class LpdeformMesh : MonoBehaviour
         normals = restNormals.Length == rest.Length ? (Vector3[])restNormals.Clone() : new Vector3[rest.Length];
         colours = new Color32[rest.Length];
 
-        try
-        {
-            client = new Client(address);
-        }
-        catch (LpdeformException error)
-        {
-            Give("Refused: " + error.Message);
-            return;
-        }
         var data = new MeshData
         {
             Positions = Floats(positions).ToArray(),
@@ -75,7 +66,16 @@ public sealed class LpdeformMesh : MonoBehaviour
             Indices = mesh.triangles,
             WeldByPosition = true  // Unity has several vertices along seams
         };
-        session = client.Open(data, new SessionOptions { WithNormals = true, FreeComponents = FreeComponents.Follow });
+        try
+        {
+            client = new Client(address);
+            session = client.Open(data, new SessionOptions { WithNormals = true, FreeComponents = FreeComponents.Follow });
+        }
+        catch (LpdeformException error)
+        {
+            Give("Refused: " + error.Message);
+            return;
+        }
         session.Noticed += notice => { if (notice.Reason != NoticeReason.None) Debug.Log("lpdeform: " + notice.Text, this); };
         foreach (var handle in handles) Hold(handle);
     }
@@ -92,6 +92,12 @@ public sealed class LpdeformMesh : MonoBehaviour
 
     void Hold(HandleObject handle)
     {
+        handle.holds = false;
+        if (string.IsNullOrEmpty(handle.name) || handle.transform == null)
+        {
+            Debug.LogWarning("Handle " + Array.IndexOf(handles, handle) + " has no name or no object", this);
+            return;
+        }
         if (!handle.hasStart) handle.start = Here(handle);
         handle.hasStart = true;
         var center = handle.start.MultiplyPoint3x4(Vector3.zero);

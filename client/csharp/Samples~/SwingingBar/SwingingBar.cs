@@ -4,7 +4,7 @@ using UnityEngine;
 
 public sealed class SwingingBar : MonoBehaviour
 {
-    public string address = "localhost:50051";
+    public string address = "localhost:8080";
 
     const int Rows = 41;
     Transform head;

@@ -11,10 +11,16 @@ extends Marker3D
 @export var hold := false:
 	set(value):
 		hold = value
-		if is_inside_tree() and hold:
-			take_rest()
-		elif is_inside_tree():
+		if not is_inside_tree():
+			return
+		if not hold:
+			_rest_before = rest
+			_let_go_at = transform
 			rest = NOWHERE
+		elif transform == _let_go_at:
+			rest = _rest_before  # as after an undo
+		else:
+			take_rest()
 
 ## Vertices closer than this to the node are held, in the unit of the mesh.
 @export_range(0.001, 10, 0.001, "or_greater") var radius := 0.1
@@ -23,6 +29,10 @@ extends Marker3D
 @export var vertices := PackedInt32Array()
 
 const NOWHERE := Transform3D(Vector3.ZERO, Vector3.ZERO, Vector3.ZERO, Vector3.ZERO)
+
+# When `hold` was switched off: `rest` before that, and `transform`.
+var _rest_before := NOWHERE
+var _let_go_at := NOWHERE
 
 ## Where the handle was on the mesh at rest, relative to the [LpdeformMesh].
 @export_storage var rest := NOWHERE

@@ -19,7 +19,11 @@ signal failed(text: String)
 ## not kept in the scene.
 @export var source: Mesh:
 	set(value):
+		if source:
+			source.changed.disconnect(_begin_soon)
 		source = value
+		if source:
+			source.changed.connect(_begin_soon)
 		_begin_soon()
 
 ## The server: "host:port", or "unix:/path" on the same machine.
@@ -218,11 +222,12 @@ func _follow(handle: LpdeformHandle) -> void:
 	if not held or held.radius != handle.radius or held.vertices != handle.vertices or held.rest != handle.rest:
 		held = _hold(handle)
 		_held[handle] = held
-	if held.count > 0 and handle.transform != held.sent:
+	var can_move := handle.transform.is_finite() and handle.basis.determinant() != 0
+	if held.count > 0 and handle.transform != held.sent and can_move:
 		# What takes the place at rest to the present one: x -> turn x + shift.
 		var turn := (handle.transform.basis * handle.rest.basis.inverse()).get_rotation_quaternion()
-		if _session.move(held.name, turn, handle.position - turn * handle.rest.origin):
-			held.sent = handle.transform
+		_session.move(held.name, turn, handle.position - turn * handle.rest.origin)
+		held.sent = handle.transform  # also if it was refused: it is said once
 
 
 func _hold(handle: LpdeformHandle) -> _Held:

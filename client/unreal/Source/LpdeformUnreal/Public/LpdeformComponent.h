@@ -33,7 +33,7 @@ class LPDEFORMUNREAL_API ULpdeformComponent : public UDynamicMeshComponent {
   ULpdeformComponent();
 
   UPROPERTY(EditAnywhere, Category = "Lpdeform")
-  FString Address = TEXT("localhost:50051");
+  FString Address = TEXT("localhost:8080");
   UPROPERTY(EditAnywhere, Category = "Lpdeform")
   TArray<FLpdeformHandle> Handles;
   /** Counts from the next BeginPlay. Below 2, the server looks for shapes of lower energy while nothing changes. */
@@ -58,7 +58,8 @@ class LPDEFORMUNREAL_API ULpdeformComponent : public UDynamicMeshComponent {
 
   // A vertex of the follower is an element of the mesh's normals: a vertex of the mesh has several where there is a hard edge.
   std::unique_ptr<LpdeformFollower> Follower;
-  TArray<int32> ElementIds;  // of the follower's vertices, in the normals
-  TArray<int32> VertexIds;   // and in the mesh
-  TArray<int32> ColorIds;    // and in the colours, if they are shown
+  bool bWasInTrouble = false;  // the log says once that the server cannot be reached
+  TArray<int32> ElementIds;    // of the follower's vertices, in the normals
+  TArray<int32> VertexIds;     // and in the mesh
+  TArray<int32> ColorIds;      // and in the colours, if they are shown
 };
