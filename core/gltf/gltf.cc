@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <cctype>
 #include <map>
+#include <new>
 #include <set>
+#include <type_traits>
 #include <utility>
 
+#include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/gltf/document.h"
 #include "core/gltf/draw_list.h"
 #include "core/gltf/packing.h"
@@ -59,6 +63,21 @@ Document document_of(const TriangleMesh& mesh) {
   return document;
 }
 
+/// What `work` returns, or why there is nothing.
+template <typename Work>
+absl::StatusOr<std::invoke_result_t<Work>> guarded(const Work& work) {
+  try {
+    return work();
+  } catch (const Refusal& refusal) {
+    return refusal.status;
+  } catch (const Json::exception&) {
+    return make_fault({Reason::kMeshSyntax, "the JSON", ""}, "The JSON has a value of a wrong kind.");
+  } catch (const std::bad_alloc&) {
+    return make_fault({Reason::kMeshUnsupported, "the file", ""},
+                      "The file needs more memory than there is.");
+  }
+}
+
 }  // namespace
 
 struct Gltf::Contents {
@@ -82,25 +101,23 @@ absl::StatusOr<Gltf> Gltf::read(const std::filesystem::path& path) {
 }
 
 absl::StatusOr<Gltf> Gltf::parse(std::string_view bytes, const std::filesystem::path& folder) {
-  try {
+  return guarded([&] {
     auto contents = std::make_shared<Contents>();
     contents->document = parse_document(bytes, folder);
     contents->list = read_draw_list(contents->document);
+    for (const char* list : {"materials", "images", "accessors", "bufferViews"})
+      count_of(contents->document.root, list);
     return Gltf(std::move(contents));
-  } catch (const Refusal& refusal) {
-    return refusal.status;
-  }
+  });
 }
 
 absl::StatusOr<Gltf> Gltf::of_mesh(const TriangleMesh& mesh) {
-  try {
+  return guarded([&] {
     auto contents = std::make_shared<Contents>();
     contents->document = document_of(mesh);
     contents->list = read_draw_list(contents->document);
     return Gltf(std::move(contents));
-  } catch (const Refusal& refusal) {
-    return refusal.status;
-  }
+  });
 }
 
 const TriangleMesh& Gltf::mesh() const {
@@ -136,12 +153,10 @@ const std::vector<std::string>& Gltf::notices() const {
 
 absl::StatusOr<std::string> Gltf::bytes(const Points& positions, Packing packing, std::optional<double> weld,
                                         bool adds_normals) const {
-  try {
+  return guarded([&] {
     Document result = rewritten(contents_->document, contents_->list, positions, weld, adds_normals);
     return packing == Packing::kGlb ? packed_glb(std::move(result)) : packed_gltf(std::move(result));
-  } catch (const Refusal& refusal) {
-    return refusal.status;
-  }
+  });
 }
 
 }  // namespace lpdeform::gltf

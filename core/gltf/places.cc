@@ -55,7 +55,9 @@ void Places::find_uses(const DrawList& list) {
     Json& attributes = rest["meshes"][mesh]["primitives"][primitive]["attributes"];
     for (const char* const name : {"POSITION", "NORMAL", "TANGENT"}) attributes.erase(name);
   }
-  for (std::size_t k = 0; k < count_of(rest, "accessors"); ++k) rest["accessors"][k].erase("bufferView");
+  for (std::size_t k = 0; k < count_of(rest, "accessors"); ++k) {
+    if (Json& one = rest["accessors"][k]; one.is_object()) one.erase("bufferView");
+  }
   find_uses_within(rest);
 }
 
