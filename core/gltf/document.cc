@@ -10,6 +10,8 @@
 namespace lpdeform::gltf {
 namespace {
 
+constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 32;
+
 void check_version(const Json& root) {
   const Json* const asset = value_of(root, "asset");
   const Json* const version = asset != nullptr ? value_of(*asset, "version") : nullptr;
@@ -69,6 +71,17 @@ std::string bytes_of_uri(const std::string& uri, const std::filesystem::path& fo
   return *std::move(bytes);
 }
 
+/// Before any is read.
+void check_lengths(const Json& root) {
+  std::uint64_t all = 0;
+  for (std::size_t k = 0; k < count_of(root, "buffers"); ++k) {
+    const std::string part = part_name(root, "buffers", k);
+    all += whole(item(root, "buffers", k), "byteLength", 0, part);
+    if (all > kMostBytes)
+      refuse_unsupported(part, "takes the buffers beyond 4 GiB, which is as much as a GLB holds");
+  }
+}
+
 std::string read_buffer(const Json& root, std::size_t k, const Container& container,
                         const std::filesystem::path& folder) {
   const Json& buffer = item(root, "buffers", k);
@@ -82,6 +95,7 @@ std::string read_buffer(const Json& root, std::size_t k, const Container& contai
       uri == nullptr ? std::string(*container.binary) : bytes_of_uri(uri->get<std::string>(), folder, part);
   if (bytes.size() < length) refuse(part, absl::StrCat("has ", bytes.size(), " bytes in place of ", length));
   bytes.resize(length);
+  bytes.shrink_to_fit();  // many buffers may be the beginning of one file
   return bytes;
 }
 
@@ -93,6 +107,7 @@ Document parse_document(std::string_view bytes, const std::filesystem::path& fol
   check_version(document.root);
   check_extensions(document.root);
   check_views(document.root);
+  check_lengths(document.root);
   for (std::size_t k = 0; k < count_of(document.root, "buffers"); ++k)
     document.buffers.push_back(read_buffer(document.root, k, container, folder));
   return document;

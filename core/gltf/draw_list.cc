@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/gltf/accessors.h"
@@ -11,7 +13,7 @@ namespace lpdeform::gltf {
 namespace {
 
 constexpr std::uint64_t kTriangles = 4, kStrip = 5, kFan = 6;  // a "mode"
-constexpr std::size_t kMostCorners = 3 * 2 * kMostElements;
+constexpr std::size_t kMostCorners = 3 * 2 * kMostElements, kMostPrimitives = 1'000'000;
 
 std::optional<std::size_t> attribute(const Json& root, const Json& attributes, const char* key,
                                      const std::string& part) {
@@ -59,6 +61,9 @@ class Reader {
     const Json* const primitives = value_of(item(root_, "meshes", mesh), "primitives");
     if (primitives == nullptr || !primitives->is_array())
       refuse(part_name(root_, "meshes", mesh), "has no \"primitives\"");
+    primitives_read_ += primitives->size();
+    if (primitives_read_ > kMostPrimitives)
+      refuse_unsupported("the scene", absl::StrCat("draws more than ", kMostPrimitives, " primitives"));
     const std::size_t first_block = list_.blocks.size();
     for (std::size_t k = 0; k < primitives->size(); ++k) {
       const std::string name = absl::StrCat("primitive ", k, " of ", part_name(root_, "meshes", mesh));
@@ -72,15 +77,15 @@ class Reader {
       refuse_unsupported(part, "is compressed by KHR_draco_mesh_compression, which is not read");
     const std::uint64_t mode = whole(primitive, "mode", kTriangles, part);
     if (mode != kTriangles && mode != kStrip && mode != kFan) {
-      list_.notices.push_back(
-          absl::StrCat("The ", mode == 0 ? "points" : "lines", " of ", part, " stay as they are."));
+      notice_once(block,
+                  absl::StrCat("The ", mode == 0 ? "points" : "lines", " of ", part, " stay as they are."));
       return;
     }
     const Json* const attributes = value_of(primitive, "attributes");
     const auto position =
         attributes != nullptr ? attribute(root_, *attributes, "POSITION", part) : std::nullopt;
     if (!position) {
-      list_.notices.push_back(absl::StrCat("There are no positions in ", part, ": it stays as it is."));
+      notice_once(block, absl::StrCat("There are no positions in ", part, ": it stays as it is."));
       return;
     }
     block.attributes = {*position, attribute(root_, *attributes, "NORMAL", part),
@@ -91,6 +96,11 @@ class Reader {
                   list_.blocks[own]);
     list_.ranges.push_back(
         {own, number, first_face, static_cast<Eigen::Index>(corners_.size() / 3) - first_face});
+  }
+
+  /// However many nodes draw the block's primitive.
+  void notice_once(const Block& block, std::string notice) {
+    if (noticed_.insert({block.mesh, block.primitives[0]}).second) list_.notices.push_back(std::move(notice));
   }
 
   std::size_t add_block(Block block, std::size_t first_block, const std::string& part) {
@@ -151,7 +161,8 @@ class Reader {
   const NodeTree tree_;
   DrawList list_;
   Eigen::Index vertex_count_ = 0;
-  std::size_t corners_read_ = 0;
+  std::size_t corners_read_ = 0, primitives_read_ = 0;
+  std::set<std::pair<std::size_t, std::size_t>> noticed_;  // meshes and their primitives
   std::vector<std::int32_t> corners_;
 };
 

@@ -1,7 +1,9 @@
 #include "core/gltf/gltf.h"
 
 #include <Eigen/Geometry>
+#include <array>
 #include <random>
+#include <vector>
 
 #include "core/base/fault.h"
 #include "core/gltf/uris.h"
@@ -286,7 +288,9 @@ TEST(Gltf, RefusalsNameThePart) {
       {[](MadeGltf& m) {
          m.root["nodes"][0]["matrix"] = {1, 2};
        },
-       syntax, "node 0 (\"page\")"}};
+       syntax, "node 0 (\"page\")"},
+      {[](MadeGltf& m) { m.root["materials"] = ""; }, syntax, "\"materials\""},
+      {[](MadeGltf& m) { m.root["images"] = ""; }, syntax, "\"images\""}};
   for (std::size_t k = 0; k < cases.size(); ++k) {
     const auto& [change, reason, element] = cases[k];
     MadeGltf made = rich_gltf();
@@ -369,15 +373,34 @@ TEST(Gltf, AMeshFromElsewhereBecomesAFileOfItsOwn) {
   EXPECT_EQ(fault_of(file->bytes(positions, Packing::kGlb, std::nullopt).status()).element, "vertex 0");
 }
 
-/// Damaged in bytes, cut off, or with a number of the JSON changed.
+void collect(ordered_json& value, std::vector<ordered_json*>& all) {
+  all.push_back(&value);
+  if (!value.is_structured()) return;
+  for (ordered_json& inner : value) collect(inner, all);
+}
+
+/// The GLB with one value of its JSON replaced by one of another kind.
+std::string with_value_replaced(const std::string& glb, std::mt19937& random) {
+  ordered_json root = json_of(glb);
+  std::vector<ordered_json*> values;
+  collect(root, values);
+  const std::array<ordered_json, 4> others{nullptr, "", ordered_json::array(), 1};
+  *values[random() % values.size()] = others[random() % others.size()];
+  return glb_bytes(root.dump(), binary_of(glb), {});
+}
+
+/// Damaged in bytes, cut off, or with a value or numbers of the JSON changed.
 std::string damaged(std::string bytes, std::mt19937& random) {
   const auto below = [&](std::size_t count) {
     return std::uniform_int_distribution<std::size_t>(0, count - 1)(random);
   };
   const std::size_t json_end = bytes.find("BIN");
-  switch (below(4)) {
+  switch (below(6)) {
     case 0:
       return bytes.substr(0, below(bytes.size()));
+    case 2:
+    case 3:
+      return with_value_replaced(bytes, random);
     case 1:
       bytes[below(bytes.size())] = static_cast<char>(below(256));
       return bytes;
@@ -388,6 +411,34 @@ std::string damaged(std::string bytes, std::mt19937& random) {
       }
       return bytes;
   }
+}
+
+TEST(Gltf, AnAccessorThatNothingUsesMayBeOfAnyKind) {
+  for (const ordered_json& other : {ordered_json(nullptr), ordered_json(1), ordered_json("")}) {
+    MadeGltf made = rich_gltf();
+    made.root["accessors"].push_back(other);
+    const Gltf file = parsed(made.glb());
+    EXPECT_EQ(json_of(bytes_of(file, moved(file, 1)))["accessors"].back(), other);
+  }
+}
+
+TEST(Gltf, AScenePaysForEachPrimitiveThatItDrawsAndSaysEachThingOnce) {
+  MadeGltf made = square();
+  const ordered_json points{{"attributes", {{"POSITION", 0}}}, {"mode", 0}};
+  const int cloud = made.mesh(std::vector<ordered_json>(1000, points));
+  made.root["scenes"][0]["nodes"].push_back(made.node({{"mesh", cloud}}));
+  made.root["scenes"][0]["nodes"].push_back(made.node({{"mesh", cloud}}));
+  EXPECT_EQ(parsed(made.glb()).notices().size(), 1000U);
+  for (int k = 0; k < 998; ++k) made.root["scenes"][0]["nodes"].push_back(made.node({{"mesh", cloud}}));
+  EXPECT_EQ(refusal(made), (std::pair<std::string, std::string>("MESH_UNSUPPORTED", "the scene")));
+}
+
+TEST(Gltf, BuffersTogetherHoldAsMuchAsAGlb) {
+  MadeGltf made = square();
+  made.root["buffers"] = {{{"byteLength", made.buffer.size()}}, {{"byteLength", std::uint64_t{1} << 32}}};
+  const auto file = Gltf::parse(glb_bytes(made.root.dump(), made.buffer, {}), {});
+  EXPECT_EQ(fault_of(file.status()).reason, "MESH_UNSUPPORTED");
+  EXPECT_EQ(fault_of(file.status()).element, "buffer 1");
 }
 
 TEST(Gltf, DamagedFilesAreRefusedOrReadAndNeverMore) {
