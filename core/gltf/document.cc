@@ -19,7 +19,7 @@ void check_version(const Json& root) {
     refuse("the JSON", "has no \"asset\" with a \"version\", as every glTF has");
   const auto& text = version->get_ref<const std::string&>();
   if (!text.starts_with("2."))
-    refuse_unsupported("the file", absl::StrCat("is glTF ", text.substr(0, 20), "; glTF 2 is read"));
+    refuse_unsupported("the file", absl::StrCat("is glTF ", printable(text), "; glTF 2 is read"));
 }
 
 /// Extensions that leave the places of vertices alone; all else that is required could move them.
@@ -38,7 +38,7 @@ void check_extensions(const Json& root) {
     const bool has_own_message =
         text == "KHR_draco_mesh_compression" || text.ends_with("_meshopt_compression");
     if (!is_harmless(text) && !has_own_message)
-      refuse_unsupported(absl::StrCat("the extension ", text.substr(0, 60)),
+      refuse_unsupported(absl::StrCat("the extension ", printable(text)),
                          "is required by the file and not known here");
   }
 }
@@ -65,9 +65,10 @@ std::string bytes_of_uri(const std::string& uri, const std::filesystem::path& fo
   const auto file = file_within(folder, uri);
   if (!file)
     refuse(part,
-           absl::StrCat("is at \"", uri.substr(0, 80), "\", which is no file within the folder of the glTF"));
+           absl::StrCat("is at \"", printable(uri), "\", which is no file within the folder of the glTF"));
   auto bytes = read_whole_file(*file);
-  if (!bytes.ok()) refuse(part, absl::StrCat("is in the file ", file->string(), ", which cannot be read"));
+  if (!bytes.ok())
+    refuse(part, absl::StrCat("is in the file \"", printable(uri), "\", which cannot be read"));
   return *std::move(bytes);
 }
 

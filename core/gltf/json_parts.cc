@@ -13,7 +13,7 @@ namespace lpdeform::gltf {
 namespace {
 
 constexpr int kDeepest = 100;  // nlohmann-json writes by recursion
-constexpr std::size_t kLongestName = 60;
+constexpr std::size_t kLongest = 60;
 
 std::string sentence(const std::string& part, std::string_view what) {
   std::string text = absl::StrCat(part, " ", std::string(what), ".");
@@ -41,16 +41,6 @@ int depth_of(std::string_view text) {
   return deepest;
 }
 
-std::string printable(std::string name) {
-  for (char& c : name) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f || c == '"') c = '?';
-  }
-  if (name.size() <= kLongestName) return name;
-  std::size_t end = kLongestName;  // not within a character of UTF-8
-  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xc0) == 0x80) --end;
-  return name.substr(0, end) + "...";
-}
-
 }  // namespace
 
 void refuse(const std::string& part, std::string_view what) {
@@ -72,6 +62,16 @@ Json parse_json(std::string_view text) {
   } catch (const Json::exception&) {
     refuse("the JSON", "has a number that is out of range");
   }
+}
+
+std::string printable(std::string text) {
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f || c == '"') c = '?';
+  }
+  if (text.size() <= kLongest) return text;
+  std::size_t end = kLongest;  // not within a character of UTF-8
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;
+  return text.substr(0, end) + "...";
 }
 
 std::string part_name(const Json& root, const char* list, std::size_t index) {

@@ -29,6 +29,9 @@ struct Refusal {
 /// Throws MESH_SYNTAX if `text` is no JSON object, or nests deeper than 100 levels.
 Json parse_json(std::string_view text);
 
+/// Text of a file for a message: no quotes or control characters, and cut where it is long, between characters of UTF-8.
+std::string printable(std::string text);
+
 /// "mesh 3 ("body")", or "mesh 3" if it has no name. `list`: "meshes".
 std::string part_name(const Json& root, const char* list, std::size_t index);
 

@@ -299,6 +299,26 @@ TEST(Gltf, RefusalsNameThePart) {
   }
 }
 
+TEST(Gltf, MessagesAreUtf8WhateverAFileSays) {
+  std::string umlauts = "x";
+  for (int k = 0; k < 100; ++k) umlauts += "\u00fc";
+  MadeGltf version = rich_gltf(), extension = rich_gltf();
+  version.root["asset"]["version"] = umlauts;
+  extension.root["extensionsRequired"] = {umlauts};
+  std::vector<std::string> files{version.glb(), extension.glb()};
+  for (const std::string& uri : {umlauts, "../" + umlauts, std::string("%ff.bin"), std::string("../%ff")}) {
+    MadeGltf made = rich_gltf();
+    made.root["buffers"] = {{{"byteLength", made.buffer.size()}, {"uri", uri}}};
+    files.push_back(made.root.dump());
+  }
+  for (const std::string& file : files) {
+    const absl::Status status = Gltf::parse(file, {}).status();
+    ASSERT_FALSE(status.ok());
+    EXPECT_NO_THROW(ordered_json(std::string(status.message())).dump()) << "dump() takes UTF-8 alone";
+    EXPECT_NO_THROW(ordered_json(fault_of(status).element).dump());
+  }
+}
+
 TEST(Gltf, DeepJsonIsRefused) {
   const auto file =
       Gltf::parse("{\"asset\":" + std::string(100000, '[') + std::string(100000, ']') + "}", {});
