@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <system_error>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/gltf/uris.h"
@@ -100,17 +102,42 @@ std::string read_buffer(const Json& root, std::size_t k, const Container& contai
   return bytes;
 }
 
+std::set<std::size_t> find_images_beside(const Json& root, const std::filesystem::path& folder) {
+  std::set<std::size_t> found;
+  for (std::size_t k = 0; k < count_of(root, "images"); ++k) {
+    const auto file = image_file(item(root, "images", k), folder);
+    std::error_code error;
+    if (file && std::filesystem::is_regular_file(*file, error)) found.insert(k);
+  }
+  return found;
+}
+
+/// The program may change its folder before the file is written.
+std::filesystem::path whole_path(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::path whole = std::filesystem::absolute(folder.empty() ? "." : folder, error);
+  return error ? folder : whole;
+}
+
 }  // namespace
+
+std::optional<std::filesystem::path> image_file(const Json& image, const std::filesystem::path& folder) {
+  const Json* const uri = value_of(image, "uri");
+  if (uri == nullptr || !uri->is_string() || is_data_uri(uri->get_ref<const std::string&>()))
+    return std::nullopt;
+  return file_within(folder, uri->get_ref<const std::string&>());
+}
 
 Document parse_document(std::string_view bytes, const std::filesystem::path& folder) {
   Container container = parse_container(bytes);
-  Document document{parse_json(container.json), {}, std::move(container.others), folder};
+  Document document{parse_json(container.json), {}, std::move(container.others), whole_path(folder), {}};
   check_version(document.root);
   check_extensions(document.root);
   check_views(document.root);
   check_lengths(document.root);
   for (std::size_t k = 0; k < count_of(document.root, "buffers"); ++k)
-    document.buffers.push_back(read_buffer(document.root, k, container, folder));
+    document.buffers.push_back(read_buffer(document.root, k, container, document.folder));
+  document.images_beside = find_images_beside(document.root, document.folder);
   return document;
 }
 

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,12 +18,16 @@ struct Document {
   Json root;
   std::vector<std::string> buffers;  // at least as long as their "byteLength"
   std::vector<Chunk> other_chunks;
-  std::filesystem::path folder;  // where it lies: relative URIs begin there
+  std::filesystem::path folder;         // where it lies, absolute: relative URIs begin there
+  std::set<std::size_t> images_beside;  // those that were in files there when it was read
 };
 
 /// Reads the JSON and all buffers. Throws a Refusal: no glTF 2, an extension that is required and changes what is drawn in
 /// a way that is unknown here, geometry compressed by Draco or meshopt, a buffer that is missing, too short, or in a
 /// file outside of `folder`.
 Document parse_document(std::string_view bytes, const std::filesystem::path& folder);
+
+/// The file within `folder` that the image names, which may not be there.
+std::optional<std::filesystem::path> image_file(const Json& image, const std::filesystem::path& folder);
 
 }  // namespace lpdeform::gltf

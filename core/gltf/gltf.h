@@ -59,8 +59,9 @@ class Gltf {
   /// The file with `positions`, one per vertex of the mesh, and with normals and tangents turned as the surface turns. All else
   /// is as it came, to the bit: texture coordinates, weights of skins, morph targets, images, materials, animations, extras and
   /// extensions. Numbers are float32. Buffers, and images in the file's folder, are put in. `weld`: the tolerance if vertices
-  /// are welded by position. `adds_normals`: also where the file has none. Error:
-  /// MESH_UNSUPPORTED if a position is beyond the range of float32, or the result too large; those of weld_by_position().
+  /// are welded by position. `adds_normals`: also where the file has none. Errors:
+  /// MESH_UNSUPPORTED if a position is beyond the range of float32, or the result too large; MESH_SYNTAX if an image's file has
+  /// gone since the glTF was read; those of weld_by_position().
   absl::StatusOr<std::string> bytes(const Points& positions, Packing packing, std::optional<double> weld,
                                     bool adds_normals = false) const;
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "core/gltf/uris.h"
 #include "core/io/whole_file.h"
 
@@ -26,16 +27,19 @@ std::string media_type_of(const Json& image, const std::filesystem::path& file) 
 }
 
 /// The image if it is in a file that goes with the glTF.
-std::optional<ImageFile> image_file(const Json& image, const std::filesystem::path& folder) {
-  const Json* const uri = value_of(image, "uri");
-  if (uri == nullptr || !uri->is_string() || is_data_uri(uri->get_ref<const std::string&>()))
-    return std::nullopt;
-  const auto file = file_within(folder, uri->get_ref<const std::string&>());
+std::optional<ImageFile> image_beside(const Document& document, std::size_t k) {
+  const Json& image = item(document.root, "images", k);
+  const auto file = image_file(image, document.folder);
   if (!file) return std::nullopt;
   std::string media_type = media_type_of(image, *file);
+  if (media_type.empty()) return std::nullopt;
   auto bytes = read_whole_file(*file);
-  if (media_type.empty() || !bytes.ok()) return std::nullopt;
-  return ImageFile{std::move(media_type), *std::move(bytes)};
+  if (bytes.ok()) return ImageFile{std::move(media_type), *std::move(bytes)};
+  if (document.images_beside.contains(k))
+    refuse(part_name(document.root, "images", k),
+           absl::StrCat("is in the file \"", printable(image["uri"].get<std::string>()),
+                        "\", which cannot be read any more"));
+  return std::nullopt;
 }
 
 /// Appends at a multiple of four bytes, and returns where.
@@ -68,7 +72,7 @@ void join_buffers(Document& document) {
 void put_images_in(Document& document) {
   Json& root = document.root;
   for (std::size_t k = 0; k < count_of(root, "images"); ++k) {
-    const auto image = image_file(item(root, "images", k), document.folder);
+    const auto image = image_beside(document, k);
     if (!image) continue;
     const std::size_t begin = append_aligned(document.buffers[0], image->bytes);
     root["bufferViews"].push_back(
@@ -95,7 +99,7 @@ std::string packed_gltf(Document document) {
     root["buffers"][k]["uri"] = data_uri("application/octet-stream", document.buffers[k]);
   }
   for (std::size_t k = 0; k < count_of(root, "images"); ++k) {
-    if (const auto image = image_file(item(root, "images", k), document.folder))
+    if (const auto image = image_beside(document, k))
       root["images"][k]["uri"] = data_uri(image->media_type, image->bytes);
   }
   return root.dump(2) + "\n";

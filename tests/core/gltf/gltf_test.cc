@@ -363,6 +363,42 @@ TEST(Gltf, BuffersAndImagesLieInTheFolderAndNowhereElse) {
   EXPECT_EQ(parsed(text.dump()).mesh().vertices, moved(file, 1)) << "it needs no other file";
 }
 
+/// The current folder for a while.
+class Within {
+ public:
+  explicit Within(const std::filesystem::path& folder) : before_(std::filesystem::current_path()) {
+    std::filesystem::current_path(folder);
+  }
+  ~Within() { std::filesystem::current_path(before_); }
+  Within(const Within&) = delete;
+  Within& operator=(const Within&) = delete;
+
+ private:
+  const std::filesystem::path before_;
+};
+
+TEST(Gltf, ImagesAreFoundFromEverywhereAndAreMissedOnceTheyAreGone) {
+  const ScratchFolder folder;
+  std::filesystem::create_directory(folder / "in");
+  MadeGltf made = square();
+  made.root["images"] = {{{"uri", "a.png"}}, {{"uri", "never.png"}}};
+  std::ofstream(folder / "in/a.glb", std::ios::binary) << made.glb();
+  std::ofstream(folder / "in/a.png", std::ios::binary) << "a picture";
+  const auto file = [&] {
+    const Within there(folder / ".");
+    return Gltf::read("in/a.glb");
+  }();
+  ASSERT_TRUE(file.ok()) << file.status();
+  for (const Packing packing : {Packing::kGlb, Packing::kGltf})
+    EXPECT_EQ(bytes_of(*file, moved(*file, 1), packing).find("a.png"), std::string::npos);
+  std::filesystem::remove(folder / "in/a.png");
+  for (const Packing packing : {Packing::kGlb, Packing::kGltf}) {
+    const auto bytes = file->bytes(moved(*file, 1), packing, 0.0);
+    EXPECT_EQ(fault_of(bytes.status()).element, "image 0");
+    EXPECT_THAT(bytes.status().message(), HasSubstr("a.png"));
+  }
+}
+
 TEST(Gltf, SeveralBuffersBecomeOneInAGlb) {
   MadeGltf made = rich_gltf();
   const std::string second(kSquare.size() * 4, '\x3e');
