@@ -43,6 +43,18 @@ int refuse(const std::string& text, std::FILE* to = stderr) {
   return kBadInput;
 }
 
+/// What the reader says, which may quote the file, as a part of a sentence.
+std::string one_line(std::string text) {
+  for (std::size_t k = 0; k < text.size(); ++k) {
+    const auto code = static_cast<unsigned char>(text[k]);
+    const bool is_c1 = k > 0 && text[k - 1] == '\xc2' && code >= 0x80 && code < 0xa0;  // in UTF-8
+    if (is_c1) text[k - 1] = ' ';
+    if (is_c1 || code < 0x20 || code == 0x7f) text[k] = ' ';
+  }
+  text.erase(text.find_last_not_of(". ") + 1);
+  return text;
+}
+
 std::string ending_of(const std::filesystem::path& path) {
   std::string ending = path.extension().string();
   std::ranges::transform(ending, ending.begin(),
@@ -69,6 +81,7 @@ void turn_up(const aiScene& scene) {
   scene.mRootNode->mTransformation = turn * scene.mRootNode->mTransformation;
 }
 
+/// Returns if there is a refusal.
 int convert(const std::filesystem::path& from, const std::filesystem::path& to, std::FILE* say) {
   const auto bytes = lpdeform::read_whole_file(from);
   if (!bytes.ok()) return refuse(std::string(bytes.status().message()), say);
@@ -77,19 +90,19 @@ int convert(const std::filesystem::path& from, const std::filesystem::path& to, 
                                                           aiComponent_LIGHTS | aiComponent_CAMERAS);
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   const unsigned steps = aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_RemoveComponent |
-                         aiProcess_JoinIdenticalVertices | aiProcess_ValidateDataStructure;
+                         aiProcess_ValidateDataStructure;  // the exporter joins vertices
   const aiScene* const scene =
       importer.ReadFileFromMemory(bytes->data(), bytes->size(), steps, ending_of(from).substr(1).c_str());
   const auto unreadable = [&](std::string_view why) {
     return refuse(absl::StrCat(from.string(), " cannot be read: ", std::string(why)), say);
   };
-  if (scene == nullptr) return unreadable(absl::StrCat(importer.GetErrorString(), "."));
+  if (scene == nullptr) return unreadable(absl::StrCat(one_line(importer.GetErrorString()), "."));
   if (scene->mNumMeshes == 0) return unreadable("it has no triangles.");
   drop_textures(*scene);
   if (ending_of(from) == ".3mf") turn_up(*scene);
   Assimp::Exporter exporter;
   const aiExportDataBlob* const blob = exporter.ExportToBlob(scene, "glb2");
-  if (blob == nullptr) return unreadable(absl::StrCat(exporter.GetErrorString(), "."));
+  if (blob == nullptr) return unreadable(absl::StrCat(one_line(exporter.GetErrorString()), "."));
   const std::string_view glb(static_cast<const char*>(blob->data), blob->size);
   const auto read = lpdeform::gltf::Gltf::parse(glb, {});
   if (!read.ok()) return unreadable(std::string(read.status().message()));
@@ -97,7 +110,8 @@ int convert(const std::filesystem::path& from, const std::filesystem::path& to, 
   if (!written.ok()) return refuse(std::string(written.message()), say);
   std::printf("%s: %td vertices, %td faces\n", to.c_str(), read->mesh().vertices.rows(),
               read->mesh().faces.rows());
-  return 0;
+  std::fflush(nullptr);
+  _exit(0);  // what the reader still does to end could fail, and the file is written
 }
 
 /// In the child. What the reader itself says on stderr is left out.
@@ -116,7 +130,7 @@ int convert(const std::filesystem::path& from, const std::filesystem::path& to, 
         absl::StrCat(from.string(), " cannot be read: it needs more than ", kMostMemoryBytes >> 30, " GiB."),
         say);
   } catch (const std::exception& error) {
-    refuse(absl::StrCat(from.string(), " cannot be read: ", error.what(), "."), say);
+    refuse(absl::StrCat(from.string(), " cannot be read: ", one_line(error.what()), "."), say);
   }
   std::fflush(nullptr);
   _exit(status);
@@ -141,9 +155,9 @@ int main(int argc, char** argv) {
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   if (WIFEXITED(status)) return WEXITSTATUS(status);
-  const bool is_late = WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL;
+  const bool is_too_much = WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL;
   return refuse(
       absl::StrCat(from.string(), " cannot be read: ",
-                   is_late ? "it takes too long."
-                           : absl::StrCat("its reader has failed (", strsignal(WTERMSIG(status)), ").")));
+                   is_too_much ? "it takes too long or too much memory."
+                               : absl::StrCat("its reader has failed (", strsignal(WTERMSIG(status)), ").")));
 }

@@ -190,7 +190,7 @@ class Convert(unittest.TestCase):
                 self.assertEqual(shown.returncode, 0, shown.stderr)
                 lines = (self.folder / "bent.off").read_text().splitlines()
                 count, faces, _ = map(int, lines[1].split())
-                self.assertEqual(faces, len(TRIANGLES))
+                self.assertEqual((count, faces), (len(POINTS), len(TRIANGLES)))
                 points = [tuple(map(float, line.split())) for line in lines[2 : 2 + count]]
                 for axis, low, high in ((0, -1, 1), (1, 5, 13), (2, -1, 1)):
                     self.assertAlmostEqual(min(point[axis] for point in points), low, 5)
@@ -218,6 +218,14 @@ class Convert(unittest.TestCase):
         for name in FILES:
             for data in (b"", b"PK\x03\x04", b"<COLLADA>", bytes(1000)):
                 self.assertIn(f"{name} cannot be read: ", self.refusal(name, data))
+
+    def test_a_refusal_is_plain_text_whatever_the_file_says(self) -> None:
+        for text in ("a&#10;b", "a&#27;[31mb", "a&#155;31mb", "a&#127;b"):
+            data = FILES["tube.dae"].replace(b'source="#places"', f'source="#{text}"'.encode())
+            said = self.refusal("tube.dae", data)
+            self.assertIn("a", said)
+            self.assertTrue(said[:-1].isprintable(), said)
+            self.assertRegex(said, r"[^. ]\.\n$")
 
     def test_damaged_files_are_read_or_refused_in_one_line(self) -> None:
         chance = random.Random(7)
