@@ -40,7 +40,7 @@ nb::object LocalMeshFile::groups() const {
   nb::dict groups;
   if (!file_->gltf) return groups;
   for (const gltf::NamedVertices& group : file_->gltf->groups())
-    groups[group.name.c_str()] = array(group.vertices);
+    groups[nb::str(group.name.data(), group.name.size())] = array(group.vertices);
   return groups;
 }
 

@@ -170,13 +170,20 @@ Format format_named(std::string_view name) {
                            : Format::kQuantized;  // within a process there is nothing to compress for
 }
 
+/// A message may name a file, whose name is any bytes.
+nb::str text_of(std::string_view text) {
+  return nb::steal<nb::str>(
+      PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()), "replace"));
+}
+
 }  // namespace
 
 nb::object error_of(const absl::Status& status) {
   const Fault fault = fault_of(status);
   return nb::module_::import_("lpdeform.errors")
-      .attr("from_status")(static_cast<int>(status.code()), std::string(status.message()), fault.reason,
-                           fault.element, fault.limit, retry_after_ms(status));
+      .attr("from_status")(static_cast<int>(status.code()),
+                           text_of({status.message().data(), status.message().size()}), text_of(fault.reason),
+                           text_of(fault.element), text_of(fault.limit), retry_after_ms(status));
 }
 
 Points points_of(const Numbers3& numbers) {

@@ -270,6 +270,27 @@ def test_a_broken_file_is_refused_by_its_part(tmp_path: Path, data: bytes, reaso
     assert element in refused.value.element
 
 
+def test_names_keep_a_zero(tmp_path: Path) -> None:
+    document, buffer = strip_document()
+    document["nodes"][0]["name"], document["nodes"][1]["name"] = "a\0b", "a\0c"
+    path = tmp_path / "zero.glb"
+    path.write_bytes(glb(document, buffer))
+    mesh = lpdeform.read_mesh(path)
+    assert {"a\0b", "a\0c"} < set(mesh.groups)
+    assert [part.node for part in mesh.parts] == ["a\0b", "a\0c"]
+
+
+@pytest.mark.parametrize("uri", ["%ff.bin", "../" + 100 * "\u00fc"], ids=["no UTF-8", "long"])
+def test_a_refusal_is_text_whatever_the_file_says(tmp_path: Path, uri: str) -> None:
+    document, buffer = strip_document()
+    document["buffers"] = [{"byteLength": len(buffer), "uri": uri}]
+    path = tmp_path / "named.gltf"
+    path.write_text(json.dumps(document))
+    with pytest.raises(lpdeform.InvalidInput) as refused:
+        lpdeform.read_mesh(path)
+    assert refused.value.reason == "MESH_SYNTAX" and refused.value.element == "buffer 0"
+
+
 @pytest.mark.parametrize("name", ["mesh.fbx", "mesh", "mesh.glb.zip", "mesh.stl2"])
 def test_other_formats_are_refused_by_name(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(b"")
