@@ -40,6 +40,15 @@ absl::Status unknown(const std::filesystem::path& path, const char* endings, con
                     absl::StrCat("The name ", path.string(), why, endings, "."));
 }
 
+absl::Status check_finite(const Points& positions) {
+  for (Eigen::Index vertex = 0; vertex < positions.rows(); ++vertex) {
+    if (positions.row(vertex).allFinite()) continue;
+    return make_fault({Reason::kMeshNotFinite, absl::StrCat("vertex ", vertex), "finite coordinates"},
+                      absl::StrCat("The position of vertex ", vertex, " is NaN or infinite."));
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::StatusOr<AnyMeshFile> read_any_mesh(const std::filesystem::path& path) {
@@ -57,13 +66,16 @@ absl::StatusOr<AnyMeshFile> read_any_mesh(const std::filesystem::path& path) {
 
 absl::Status write_any_mesh(const std::filesystem::path& path, const AnyMeshFile& file,
                             const Points& positions, const Beside& beside) {
-  if (const auto packing = gltf::packing_of(path)) return write_gltf(path, *packing, file, positions, beside);
+  const auto packing = gltf::packing_of(path);
   const auto format = mesh_format(path);
-  if (!format.ok() || *format == MeshFormat::kStl) {
+  if (!packing && (!format.ok() || *format == MeshFormat::kStl)) {
     return unknown(
         path, ".glb, .gltf, .off, .obj, .ply",
         format.ok() ? " is one of an STL file, which keeps no vertices; use one of " : " ends in none of ");
   }
+  absl::Status status = check_finite(positions);
+  if (!status.ok()) return status;
+  if (packing) return write_gltf(path, *packing, file, positions, beside);
   if (*format == MeshFormat::kObj) return write_obj(path, file, positions, beside);
   return write_mesh(path, file, positions, beside.distortion, beside.normals);
 }

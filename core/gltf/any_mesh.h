@@ -32,7 +32,8 @@ struct Beside {
 
 /// Writes `positions`, one per vertex of the file's mesh, as GLB, glTF, OFF, OBJ or PLY, by the ending of `path`, completely or
 /// not at all. GLB and glTF keep everything else of a glTF input, and OBJ of an OBJ input. Errors: MESH_FORMAT_UNKNOWN,
-/// FILE_NOT_WRITTEN, and those of Gltf::bytes(); those of deformable() for a new glTF and for normals of an OBJ file.
+/// MESH_NOT_FINITE, FILE_NOT_WRITTEN, and those of Gltf::bytes(); those of deformable() for a new glTF and for normals of an OBJ
+/// file.
 absl::Status write_any_mesh(const std::filesystem::path& path, const AnyMeshFile& file,
                             const Points& positions, const Beside& beside);
 

@@ -87,8 +87,8 @@ Result<WeldedMesh> weld(const Mesh& mesh, double tolerance = 0);
 Result<Mesh> read_mesh(const std::string& path);
 
 /// A file with this mesh and nothing else: GLB, glTF, OFF, OBJ or PLY, by the ending of `path`, completely or not at all. Errors:
-/// MESH_SIZE, and those of MeshFile::write(); for GLB and glTF also MESH_EMPTY, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE and
-/// MESH_NO_AREA.
+/// MESH_SIZE, MESH_INDEX_OUT_OF_RANGE, MESH_FORMAT_UNKNOWN, MESH_NOT_FINITE, FILE_NOT_WRITTEN; for GLB and glTF also MESH_EMPTY,
+/// MESH_NO_AREA and MESH_UNSUPPORTED.
 Result<void> write_mesh(const std::string& path, const Mesh& mesh);
 
 /// "0.1.0": the version of the library that the program runs with.

@@ -58,8 +58,10 @@ class MeshFile {
 
   /// Writes GLB, glTF, OFF, OBJ or PLY, by the ending of `path`, completely or not at all. `positions`: 3 numbers for each vertex
   /// of mesh(). What the file holds beside its mesh is kept if both are glTF (.glb or .gltf), or both OBJ. Errors:
-  /// POSITIONS_SIZE, MESH_FORMAT_UNKNOWN, FILE_NOT_WRITTEN, MESH_UNSUPPORTED (a position beyond the range of float32, in which glTF
-  /// has numbers), WELD_TOLERANCE, WELD_TOO_DENSE.
+  /// POSITIONS_SIZE, MESH_FORMAT_UNKNOWN, MESH_NOT_FINITE, FILE_NOT_WRITTEN. GLB and glTF: MESH_UNSUPPORTED (a position beyond the
+  /// range of float32, in which glTF has numbers, or a file that would be too large) and MESH_SYNTAX (a part that is wrong, or an
+  /// image whose file has gone since). A new GLB or glTF, and normals of an OBJ: MESH_EMPTY, MESH_INDEX_OUT_OF_RANGE, MESH_NO_AREA.
+  /// Normals: WELD_TOLERANCE, WELD_TOO_DENSE.
   Result<void> write(const std::string& path, const std::vector<double>& positions,
                      const WriteOptions& options = {}) const;
 

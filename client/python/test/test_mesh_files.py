@@ -311,7 +311,10 @@ def test_wrong_calls_are_refused_and_write_nothing(strip: Path, tmp_path: Path) 
         ("ARRAY_TYPE", lambda: mesh.write(out, mesh.vertices, weld="much")),  # type: ignore[arg-type]
         ("WELD_TOLERANCE", lambda: mesh.write(out, mesh.vertices, weld=0.5)),
         ("MESH_UNSUPPORTED", lambda: mesh.write(out, mesh.vertices * 1e300)),
-        ("MESH_UNSUPPORTED", lambda: mesh.write(out, mesh.vertices * np.nan)),
+        *(
+            ("MESH_NOT_FINITE", lambda ending=ending: mesh.write(tmp_path / f"out.{ending}", mesh.vertices * np.nan))
+            for ending in ("glb", "gltf", "obj", "off", "ply")
+        ),
         ("MESH_FORMAT_UNKNOWN", lambda: mesh.write(tmp_path / "out.stl", mesh.vertices)),
         ("FILE_NOT_WRITTEN", lambda: mesh.write(tmp_path / "no" / "out.glb", mesh.vertices)),
         ("MESH_INDEX_OUT_OF_RANGE", lambda: lpdeform.write_mesh(out, [[0, 0, 0]], [[0, 0, 1]])),

@@ -334,5 +334,19 @@ TEST(CoreLibrary, WritesAMeshThatItReads) {
   EXPECT_EQ(said(write_mesh("shape.step", mesh)).at(0), "MESH_FORMAT_UNKNOWN");
 }
 
+TEST(CoreLibrary, WritesNoPositionsThatAreNotFinite) {
+  for (const char* ending : {"obj", "off", "ply", "glb", "gltf"}) {
+    const std::string path = testing::TempDir() + "core_library_test." + ending;
+    for (const double wrong :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+      Mesh mesh = sheet();
+      mesh.vertices[4] = wrong;
+      EXPECT_THAT(said(write_mesh(path, mesh)),
+                  ElementsAre("MESH_NOT_FINITE", "vertex 1", "finite coordinates"));
+    }
+    EXPECT_EQ(said(read_mesh(path)).at(0), "MESH_FILE_NOT_FOUND") << "nothing is written";
+  }
+}
+
 }  // namespace
 }  // namespace lpdeform::core

@@ -90,8 +90,10 @@ class MeshFile:
         adds_normals: GLB, glTF and OBJ get normals even if the file has none.
         weld: as in open(), for normals. None: as open() does by default.
 
-        Raises InvalidInput: POSITIONS_SIZE, MESH_FORMAT_UNKNOWN, WELD_TOLERANCE, MESH_UNSUPPORTED (a position beyond the range of
-        float32, in which glTF has numbers); FILE_NOT_WRITTEN.
+        Raises InvalidInput: POSITIONS_SIZE, MESH_FORMAT_UNKNOWN, MESH_NOT_FINITE; for GLB and glTF MESH_UNSUPPORTED (a position
+        beyond the range of float32, in which glTF has numbers, or a file that would be too large) and MESH_SYNTAX (a part that is
+        wrong, or an image whose file has gone since); for a new GLB or glTF, and for normals of an OBJ, MESH_EMPTY,
+        MESH_INDEX_OUT_OF_RANGE and MESH_NO_AREA; for normals WELD_TOLERANCE and WELD_TOO_DENSE. FILE_NOT_WRITTEN.
         """
         points = numbers(positions, "positions", 3)
         if len(points) != len(self._vertices):
@@ -123,8 +125,9 @@ def read_mesh(path: Path) -> MeshFile:
 def write_mesh(path: Path, vertices: npt.ArrayLike, faces: npt.ArrayLike) -> None:
     """Writes a file with this mesh and nothing else, completely or not at all: .glb, .gltf, .off, .obj or .ply.
 
-    MeshFile.write() keeps what a file has beside its mesh. Raises InvalidInput: INDEX_OUT_OF_RANGE, MESH_FORMAT_UNKNOWN, and for
-    .glb and .gltf MESH_EMPTY, MESH_NOT_FINITE, MESH_NO_AREA and MESH_UNSUPPORTED; FILE_NOT_WRITTEN; NO_SOLVER as read_mesh().
+    MeshFile.write() keeps what a file has beside its mesh. Raises InvalidInput: INDEX_OUT_OF_RANGE,
+    MESH_INDEX_OUT_OF_RANGE, MESH_FORMAT_UNKNOWN, MESH_NOT_FINITE, and for .glb and .gltf MESH_EMPTY, MESH_NO_AREA and
+    MESH_UNSUPPORTED; FILE_NOT_WRITTEN; NO_SOLVER as read_mesh().
     """
     points = numbers(vertices, "vertices", 3).astype(np.float64)
     triangles = indices(faces, "faces", 3, below=len(points))
