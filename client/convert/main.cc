@@ -11,7 +11,6 @@
 #include <array>
 #include <assimp/Exporter.hpp>
 #include <assimp/Importer.hpp>
-#include <cctype>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -30,6 +29,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/gltf/gltf.h"
+#include "core/io/mesh_io.h"
 #include "core/io/whole_file.h"
 
 namespace {
@@ -53,13 +53,6 @@ std::string one_line(std::string text) {
   }
   text.erase(text.find_last_not_of(". ") + 1);
   return text;
-}
-
-std::string ending_of(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending;
 }
 
 /// A texture is a file of its own; the GLB would name it.
@@ -91,15 +84,15 @@ int convert(const std::filesystem::path& from, const std::filesystem::path& to, 
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   const unsigned steps = aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_RemoveComponent |
                          aiProcess_ValidateDataStructure;  // the exporter joins vertices
-  const aiScene* const scene =
-      importer.ReadFileFromMemory(bytes->data(), bytes->size(), steps, ending_of(from).substr(1).c_str());
+  const aiScene* const scene = importer.ReadFileFromMemory(bytes->data(), bytes->size(), steps,
+                                                           lpdeform::ending_of(from).substr(1).c_str());
   const auto unreadable = [&](std::string_view why) {
     return refuse(absl::StrCat(from.string(), " cannot be read: ", std::string(why)), say);
   };
   if (scene == nullptr) return unreadable(absl::StrCat(one_line(importer.GetErrorString()), "."));
   if (scene->mNumMeshes == 0) return unreadable("it has no triangles.");
   drop_textures(*scene);
-  if (ending_of(from) == ".3mf") turn_up(*scene);
+  if (lpdeform::ending_of(from) == ".3mf") turn_up(*scene);
   Assimp::Exporter exporter;
   const aiExportDataBlob* const blob = exporter.ExportToBlob(scene, "glb2");
   if (blob == nullptr) return unreadable(absl::StrCat(one_line(exporter.GetErrorString()), "."));
@@ -144,9 +137,9 @@ int main(int argc, char** argv) {
     return kBadInput;
   }
   const std::filesystem::path from = argv[1], to = argv[2];
-  if (std::ranges::find(kEndings, ending_of(from)) == kEndings.end())
+  if (std::ranges::find(kEndings, lpdeform::ending_of(from)) == kEndings.end())
     return refuse(absl::StrCat("The name ", from.string(), " ends in none of .fbx, .dae and .3mf."));
-  if (ending_of(to) != ".glb")
+  if (lpdeform::ending_of(to) != ".glb")
     return refuse(absl::StrCat("The name ", to.string(), " does not end in .glb."));
   const pid_t child = fork();
   if (child < 0) return refuse(absl::StrCat("There is no process for it: ", std::strerror(errno), "."));

@@ -1,7 +1,5 @@
 #include "core/gltf/gltf.h"
 
-#include <algorithm>
-#include <cctype>
 #include <map>
 #include <new>
 #include <set>
@@ -15,6 +13,7 @@
 #include "core/gltf/packing.h"
 #include "core/gltf/rewrite.h"
 #include "core/io/byte_order.h"
+#include "core/io/mesh_io.h"
 #include "core/io/whole_file.h"
 
 namespace lpdeform::gltf {
@@ -86,9 +85,7 @@ struct Gltf::Contents {
 };
 
 std::optional<Packing> packing_of(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = ending_of(path);
   if (ending == ".glb") return Packing::kGlb;
   if (ending == ".gltf") return Packing::kGltf;
   return std::nullopt;

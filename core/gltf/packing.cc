@@ -1,12 +1,11 @@
 #include "core/gltf/packing.h"
 
-#include <algorithm>
-#include <cctype>
 #include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/gltf/uris.h"
+#include "core/io/mesh_io.h"
 #include "core/io/whole_file.h"
 
 namespace lpdeform::gltf {
@@ -19,9 +18,7 @@ struct ImageFile {
 std::string media_type_of(const Json& image, const std::filesystem::path& file) {
   const Json* const given = value_of(image, "mimeType");
   if (given != nullptr && given->is_string()) return given->get<std::string>();
-  std::string ending = file.extension().string();
-  std::ranges::transform(ending, ending.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = ending_of(file);
   if (ending == ".png" || ending == ".webp" || ending == ".ktx2") return "image/" + ending.substr(1);
   return ending == ".jpg" || ending == ".jpeg" ? "image/jpeg" : "";
 }

@@ -10,6 +10,9 @@
 
 namespace lpdeform {
 
+/// ".obj" of "a/b.OBJ", in lower case. Empty if the name has no ending.
+std::string ending_of(const std::filesystem::path& path);
+
 enum class MeshFormat { kOff, kObj, kPly, kStl };
 
 /// The format by the file name's extension, in upper or lower case. INVALID_ARGUMENT (MESH_FORMAT_UNKNOWN) names the

@@ -26,9 +26,14 @@ absl::StatusOr<TriangleMesh> parse_triangles(std::string_view bytes, MeshFormat 
 
 }  // namespace
 
-absl::StatusOr<MeshFormat> mesh_format(const std::filesystem::path& path) {
+std::string ending_of(const std::filesystem::path& path) {
   std::string ending = path.extension().string();
   for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return ending;
+}
+
+absl::StatusOr<MeshFormat> mesh_format(const std::filesystem::path& path) {
+  const std::string ending = ending_of(path);
   if (ending == ".off") return MeshFormat::kOff;
   if (ending == ".obj") return MeshFormat::kObj;
   if (ending == ".ply") return MeshFormat::kPly;

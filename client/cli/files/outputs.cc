@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -12,17 +11,11 @@
 #include "client/cli/files/text_file.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
+#include "core/io/mesh_io.h"
 #include "core/io/obj_normals.h"
 
 namespace lpdeform::cli {
 namespace {
-
-std::string ending_of(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending;
-}
 
 /// True also for different spellings of one path, such as ./a and a. Streams such as /dev/stdout never count
 /// as the same file, so they may be given several times.
