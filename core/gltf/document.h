@@ -24,7 +24,7 @@ struct Document {
 
 /// Reads the JSON and all buffers. Throws a Refusal: no glTF 2, an extension that is required and changes what is drawn in
 /// a way that is unknown here, geometry compressed by Draco or meshopt, a buffer that is missing, too short, or in a
-/// file outside of `folder`.
+/// file outside of `folder`, buffers of more than 4 GiB together.
 Document parse_document(std::string_view bytes, const std::filesystem::path& folder);
 
 /// The file within `folder` that the image names, which may not be there.

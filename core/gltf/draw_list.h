@@ -42,7 +42,8 @@ struct DrawList {
   std::vector<std::string> notices;  // sentences about what is left as it is
 };
 
-/// Throws a Refusal: no triangles, a primitive that is compressed, or that has indices or accessors out of range.
+/// Throws a Refusal: no triangles, more than 20 million vertices, 40 million triangles or a million primitives, a primitive that
+/// is compressed, or that has indices or accessors out of range.
 DrawList read_draw_list(const Document& document);
 
 }  // namespace lpdeform::gltf
