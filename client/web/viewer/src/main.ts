@@ -5,6 +5,7 @@ import { Keeper } from "./app/keeper.js";
 import { followSolving } from "./app/solving.js";
 import { startShortcuts } from "./app/shortcuts.js";
 import { exposeForTests } from "./app/testing.js";
+import { watchedIn } from "./link/watched.js";
 import { canDraw } from "./stage/software.js";
 import { noPictures } from "./ui/no_pictures.js";
 import { wantsBack } from "./ui/wants_back.js";
@@ -23,7 +24,10 @@ if (canDraw) await start();
 else root.append(noPictures());
 
 async function start(): Promise<void> {
-  const watched = new URLSearchParams(location.search).get("watch");
+  const watched = watchedIn(location.hash);
+  window.addEventListener("hashchange", () => {
+    if (watchedIn(location.hash) !== watched) location.reload();
+  });
   const app = new App(watched !== null);
   if (watched !== null) {
     root.append(...watchingPage(app, watched));

@@ -185,9 +185,12 @@ export class App implements Workbench {
     this.fit();
   }
 
-  /** Shows somebody else's session, for as long as the page is there; only if `isWatching`. Rejects with an LpdeformError. */
+  /**
+   * Shows somebody else's session, for as long as the page is there; only if `isWatching`. Waits for a server that is away. Rejects
+   * with an LpdeformError if it cannot be watched.
+   */
   async watch(session: string): Promise<void> {
-    const mesh = await watchedMesh(session);
+    const mesh = await watchedMesh(session, (status) => this.facts.set({ status }));
     await prepare(mesh);
     this.#watched = session;
     this.open(mesh, emptyDocument);
