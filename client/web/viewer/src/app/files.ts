@@ -107,9 +107,8 @@ export class Files {
     }
     const { glbOf } = await import("../io/foreign.js");
     const { glb, left } = await glbOf(file);
-    this.#openMesh(await openedMesh(glb, []));
-    const gone = left.length > 0 ? ` Its ${left.join(" and ")} are not taken over.` : "";
-    this.app.notify(`${file.name} is opened as ${glb.name}.${gone}`);
+    const gone = left.length > 0 ? `Its ${left.join(" and ")} are not taken over. ` : "";
+    this.#openMesh(await openedMesh(glb, []), `${file.name} is opened as ${glb.name}. ${gone}`);
   }
 
   /** In the doubles of the server's result, which are more precise than the drawn surface. */
@@ -195,7 +194,8 @@ export class Files {
     return this.app.mesh.name.replace(/\.[^.]*$/, "") || "mesh";
   }
 
-  #openMesh(mesh: Mesh): void {
+  /** `first`: what the user is told before what is said of every mesh. */
+  #openMesh(mesh: Mesh, first = ""): void {
     const { name } = mesh;
     const { p, secondP } = this.app.document;
     this.app.open(mesh, { ...emptyDocument, p, secondP });
@@ -205,7 +205,7 @@ export class Files {
     const count = (mesh.positions.length / 3).toLocaleString("en");
     const { seamVertices } = this.app.facts.now;
     const welded = `, ${seamVertices.toLocaleString("en")} of them copies along seams, welded: the panel “Mesh” has a switch`;
-    this.app.notify(`${name}: ${count} vertices${seamVertices > 0 ? welded : ""}.${up}`);
+    this.app.notify(`${first}${name}: ${count} vertices${seamVertices > 0 ? welded : ""}.${up}`);
   }
 
   #openHandles(name: string, text: string): void {
