@@ -19,7 +19,7 @@ it("who watches is told whether it is over, will come back, or is not allowed", 
   const kind = (error: LpdeformError) => [watchedStatus(error).kind, watchedStatus(error).title];
   expect(kind(new LpdeformError("not_found", "x", { reason: "SESSION_UNKNOWN" }))).toEqual([
     "refused",
-    "This session has ended",
+    "This session has ended, or is not yours to see",
   ]);
   expect(kind(new LpdeformError("aborted", "x", { reason: "SESSION_DELETED" as never }))[0]).toBe("refused");
   expect(kind(new LpdeformError("unavailable", "x"))).toEqual(["away", "The server is away"]);

@@ -126,12 +126,13 @@ export class Files {
       if (format === "obj") save(name, obj ? rewriteObj({ ...mesh, obj }, positions) : writeObj(deformed));
       if (format === "off") save(name, writeOff(deformed));
       if (format === "stl") save(name, (await import("../io/write_stl.js")).writeStl(deformed));
-      const lost = lostIn(mesh, format);
-      if (lost.length > 0) {
-        const better = obj || gltf ? ` Saved as ${obj ? "OBJ" : "GLB"}, they stay.` : "";
-        this.app.notify(`${name} does not have what the original file also had: ${lost.join(", ")}.${better}`);
-      }
+      this.#sayLost(name, lostIn(mesh, format), obj || gltf ? ` Saved as ${obj ? "OBJ" : "GLB"}, they stay.` : "");
     }
+  }
+
+  #sayLost(name: string, lost: readonly string[], better = ""): void {
+    if (lost.length === 0) return;
+    this.app.notify(`${name} does not have what the original file also had: ${lost.join(", ")}.${better}`);
   }
 
   async #exactly({ stage, live, distortion }: Pane): Promise<Exported> {
@@ -177,7 +178,11 @@ export class Files {
       const content = as === "glb" ? await posesAsGlb(this.app) : await posesAsVideo(this.app);
       if (content instanceof Blob)
         save(`${this.#stem}-poses.${content.type.startsWith("video/mp4") ? "mp4" : "webm"}`, content);
-      else if (content) save(`${this.#stem}-poses.glb`, content);
+      else if (content) {
+        const name = `${this.#stem}-poses.glb`;
+        save(name, content);
+        this.#sayLost(name, this.app.mesh.beside ?? []);
+      }
     } catch (thrown) {
       this.app.notify(`The poses were not exported. ${sentence((thrown as Error).message)}`, true);
     }

@@ -60,7 +60,7 @@ async function readMesh(session: string): Promise<Mesh> {
 export function watchedStatus(error: LpdeformError, status = statusOf(error)): Status {
   if (error.code === "not_found" || error.reason.startsWith("SESSION_")) {
     const text = "Whoever works on it has closed it or opened something else. Ask for a new link.";
-    return say("refused", "This session has ended", text);
+    return say("refused", "This session has ended, or is not yours to see", text);
   }
   return isPassing(status)
     ? say(status.kind, status.title, "Trying again by itself…")

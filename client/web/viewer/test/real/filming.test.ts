@@ -2,6 +2,7 @@ import { writeFileSync } from "node:fs";
 import { beforeAll, expect, it } from "vitest";
 import { readGltfDocument } from "../../src/io/gltf_document.js";
 import { faultsOf } from "../gltf_validator.js";
+import { columns, makeGlb, rows } from "../made_glb.js";
 import { bar, withUser } from "./opened.js";
 import type { User } from "./user.js";
 
@@ -97,4 +98,16 @@ it("nothing is saved if another mesh is opened while the video is recorded", asy
   await user.page.locator(".notice.bad", { hasText: "The work has changed" }).waitFor();
   await user.settled();
   expect(downloads).toBe(0);
+});
+
+it("what the file of the mesh also had is not in a GLB of its poses, and the page says so", async () => {
+  await user.openFiles({ name: "tube.glb", content: Buffer.from(makeGlb()) });
+  await user.until(`window.__lpdeform.app.mesh.name === "tube.glb"`);
+  const ends = [0, rows].map((row) => Array.from({ length: columns + 1 }, (_, column) => row * (columns + 1) + column));
+  const handles = ends.map((vertices, k) => ({ name: `end ${k}`, vertices }));
+  await user.openFiles({ name: "h.json", content: JSON.stringify({ handles }) });
+  await keep();
+  await keep();
+  await user.save("Poses as GLB, with morph targets");
+  await user.page.locator(".notice", { hasText: /tube-poses.glb does not have what .* also had: .*materials/ }).waitFor();
 });
