@@ -5,7 +5,6 @@ import { Keeper } from "./app/keeper.js";
 import { followSolving } from "./app/solving.js";
 import { startShortcuts } from "./app/shortcuts.js";
 import { exposeForTests } from "./app/testing.js";
-import { watchedIn } from "./link/watched.js";
 import { canDraw } from "./stage/software.js";
 import { noPictures } from "./ui/no_pictures.js";
 import { wantsBack } from "./ui/wants_back.js";
@@ -17,16 +16,16 @@ import { sidePanel } from "./ui/sidepanel.js";
 import { startTheme } from "./ui/theme.js";
 import { toolbar } from "./ui/toolbar.js";
 import { topbar } from "./ui/topbar.js";
-import { watchingPage } from "./ui/watching.js";
+import { watchedHere, watchingPage } from "./ui/watching.js";
 
 const root = document.querySelector("#app")!;
 if (canDraw) await start();
 else root.append(noPictures());
 
 async function start(): Promise<void> {
-  const watched = watchedIn(location.hash);
+  const watched = watchedHere();
   window.addEventListener("hashchange", () => {
-    if (watchedIn(location.hash) !== watched) location.reload();
+    if (watchedHere() !== watched) location.reload();
   });
   const app = new App(watched !== null);
   if (watched !== null) {
