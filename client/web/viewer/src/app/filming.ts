@@ -1,3 +1,4 @@
+import { LpdeformError } from "lpdeform-client";
 import { morphGlb } from "../io/gltf_morphs.js";
 import { shapesOf } from "../link/prepare.js";
 import { shownOf } from "../model/derived.js";
@@ -37,17 +38,23 @@ async function film(app: App): Promise<Film | undefined> {
   const room = Math.floor(mostBytes / ((bytesEach * mesh.positions.length) / 3) / poses);
   const moments = momentsOf(document, Math.min(steps, Math.max(room, 1)));
   const shapes: Shape[] = [];
-  const say = () => app.notifyWhile(`Solving for the poses: ${shapes.length + 1} of ${moments.length}…`);
+  const say = () => app.notifyWhile(`Solving for the poses: ${shapes.length + 1} of ${moments.length}… Escape stops it.`);
   let done = say();
+  const over = new AbortController();
+  const stop = ({ code }: KeyboardEvent) => {
+    if (code === "Escape") over.abort(new LpdeformError("cancelled", "Escape was pressed."));
+  };
+  window.addEventListener("keydown", stop);
   try {
     const documents = moments.map((moment) => moment.document);
-    for await (const shape of shapesOf(mesh, documents, seams?.groups, new AbortController().signal)) {
+    for await (const shape of shapesOf(mesh, documents, seams?.groups, over.signal)) {
       if (isAnother()) break;
       shapes.push(shape);
       if (shapes.length < moments.length) done = say();
     }
     return isAnother() ? sayChanged(app) : { moments, shapes, seconds: secondsEach * (poses - 1) };
   } finally {
+    window.removeEventListener("keydown", stop);
     done();
   }
 }

@@ -22,6 +22,19 @@ it("without two poses there is nothing to export, which is said", async () => {
   await user.page.locator(".notice.bad", { hasText: "two poses" }).waitFor();
 });
 
+it("Escape ends waiting for a server that does not answer", async () => {
+  await keep();
+  const requests = "**/lpdeform.v1.*/CreateSession";
+  await user.page.route(requests, () => undefined); // without an answer
+  await user.page.getByRole("button", { name: "Save" }).click();
+  await user.page.getByRole("menuitem", { name: "Poses as GLB" }).click();
+  await user.page.locator(".notice", { hasText: "Solving for the poses: 1 of" }).waitFor();
+  await user.page.keyboard.press("Escape");
+  await user.page.locator(".notice.bad", { hasText: "The poses were not exported." }).waitFor();
+  await user.page.unroute(requests);
+  await user.page.getByRole("button", { name: "Delete Pose 2" }).click();
+});
+
 it("poses are exported as morph targets, solved in between, and validated", async () => {
   const [vertex] = await user.ask<number[]>("document().handles[1].vertices");
   await user.drag(await user.vertexOnPage(vertex!), 150, 60);
