@@ -349,8 +349,8 @@ export class Session implements AsyncIterable<Frame> {
 
   /**
    * The mesh that the session deforms, at rest, in the order of its frames: for those who have joined it. The server sends a whole
-   * snapshot for that. Rejects with DATA_LOSS (SNAPSHOT_INCOMPLETE, SNAPSHOT_DAMAGED), and SNAPSHOT_NEWER if the server is of a later
-   * version.
+   * snapshot for that. Rejects with DATA_LOSS (SNAPSHOT_INCOMPLETE) and with INVALID_ARGUMENT (SNAPSHOT_DAMAGED, and SNAPSHOT_NEWER
+   * if the server is of a later version).
    */
   async mesh(options: { signal?: AbortSignal } = {}): Promise<RestMesh> {
     return meshIn(await this.snapshot(options));

@@ -16,14 +16,17 @@ import { sidePanel } from "./ui/sidepanel.js";
 import { startTheme } from "./ui/theme.js";
 import { toolbar } from "./ui/toolbar.js";
 import { topbar } from "./ui/topbar.js";
-import { watchingPage } from "./ui/watching.js";
+import { watchedHere, watchingPage } from "./ui/watching.js";
 
 const root = document.querySelector("#app")!;
 if (canDraw) await start();
 else root.append(noPictures());
 
 async function start(): Promise<void> {
-  const watched = new URLSearchParams(location.search).get("watch");
+  const watched = watchedHere();
+  window.addEventListener("hashchange", () => {
+    if (watchedHere() !== watched) location.reload();
+  });
   const app = new App(watched !== null);
   if (watched !== null) {
     root.append(...watchingPage(app, watched));

@@ -1,3 +1,4 @@
+import { deflateSync } from "node:zlib";
 import { strToU8, zipSync } from "three/addons/libs/fflate.module.js";
 
 // A tube along z, of radius 1 and height 8, in the three formats, as small as each allows. Rows of `columns` vertices; the first row
@@ -86,6 +87,29 @@ Connections:  {
 	C: "OO",1001,1002
 }
 `;
+}
+
+/** A binary FBX of this version without a mesh: a node with a few properties, and in it one with `count` packed truths. */
+export function makeBinaryFbx(version: number, count: number): Buffer {
+  const number = (value: number) => Buffer.from(Uint32Array.of(value).buffer);
+  const field = (value: number) => (version >= 7500 ? Buffer.from(BigUint64Array.of(BigInt(value)).buffer) : number(value));
+  const node = (name: string, count: number, properties: Buffer) =>
+    Buffer.concat([
+      field(1e6),
+      field(count),
+      field(properties.length),
+      Buffer.from([name.length]),
+      Buffer.from(name),
+      properties,
+    ]);
+  const packed = deflateSync(new Uint8Array(count));
+  return Buffer.concat([
+    Buffer.from("Kaydara FBX Binary  \0\x1a\0"),
+    number(version),
+    node("Objects", 4, Buffer.concat([Buffer.from("S"), number(3), Buffer.from("abcC\x01D12345678R"), number(0)])),
+    node("Truths", 1, Buffer.concat([Buffer.from("b"), number(count), number(1), number(packed.length), packed])),
+    Buffer.alloc(300),
+  ]);
 }
 
 /** 3MF, which is a ZIP file. `padding`: bytes of zeros beside. */

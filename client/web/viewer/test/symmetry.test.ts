@@ -84,6 +84,12 @@ describe("symmetric work", () => {
     expect(Math.hypot(...after.rotation)).toBeCloseTo(1, 12);
   });
 
+  it("does not move a handle on the plane that is only locked", () => {
+    const off = changeHandle(both, "middle", { pose: { ...handleOf(both, "middle")!.pose, translation: [1, 2, 3] } });
+    const after = handleOf(change(off, "middle", { isLocked: true }), "middle")!;
+    expect(after).toMatchObject({ isLocked: true, pose: { translation: [1, 2, 3] } });
+  });
+
   it("lets the selected one of two partners count that have both changed", () => {
     const own = { ...handleOf(both, "right")!.pose, translation: [5, 5, 5] as const };
     const after = symmetric(both, changeHandle(changeHandle(both, "left", { pose }), "right", { pose: own }), mirror, [

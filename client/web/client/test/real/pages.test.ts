@@ -42,7 +42,12 @@ async function open(example: string): Promise<{ page: Page; errors: string[] }> 
 }
 
 /** The share of the picture's pixels that are of the cylinder's blue, left and right of the middle. */
-async function blueOf(page: Page): Promise<{ left: number; right: number }> {
+interface Blue {
+  left: number;
+  right: number;
+}
+
+async function blueOf(page: Page): Promise<Blue> {
   const picture = (await page.screenshot()).toString("base64");
   return page.evaluate(async (picture) => {
     const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${picture}`)).blob());
@@ -59,16 +64,16 @@ async function blueOf(page: Page): Promise<{ left: number; right: number }> {
   }, picture);
 }
 
-async function until(page: Page, isSo: (blue: { left: number; right: number }) => boolean): Promise<void> {
+const isStraight = ({ left, right }: Blue) => left > 0.01 && Math.abs(left - right) < 0.01;
+
+async function until(page: Page, isSo: (blue: Blue) => boolean): Promise<void> {
   while (!isSo(await blueOf(page))) await page.waitForTimeout(100);
 }
 
 test("three.js: the cylinder bends to where its end is dragged", async () => {
   const { page, errors } = await open("three");
   await page.getByText("Energy").waitFor();
-  const straight = await blueOf(page);
-  expect(straight.left).toBeGreaterThan(0.01);
-  expect(straight.right).toBeCloseTo(straight.left, 2);
+  await until(page, isStraight);
   await page.mouse.move(400, 83); // where the ball is
   await page.mouse.down();
   await page.mouse.move(600, 150, { steps: 20 });
@@ -79,7 +84,7 @@ test("three.js: the cylinder bends to where its end is dragged", async () => {
 
 test("React: the cylinder bends as the slider says", async () => {
   const { page, errors } = await open("react");
-  await until(page, ({ left, right }) => left > 0.01 && Math.abs(left - right) < 0.01);
+  await until(page, isStraight);
   await page.getByLabel("Bend").fill("-90");
   await until(page, ({ left, right }) => right > 1.5 * left);
   await page.getByLabel("Bend").fill("90");

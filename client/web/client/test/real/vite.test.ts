@@ -4,7 +4,7 @@ import { createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { type Browser, chromium, type Page } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import { afterAll, afterEach, beforeAll, expect, test } from "vitest";
 import { Service } from "../support/service.js";
 
 // A new project of Vite, in a folder that knows nothing of this one, with the package as npm packs it: the README's first program
@@ -60,7 +60,10 @@ async function serve(...args: string[]): Promise<void> {
       ({ ok }) => ok,
       () => false,
     );
-  while (!(await isUp())) await new Promise((again) => setTimeout(again, 50));
+  while (!(await isUp())) {
+    if (serving.exitCode !== null) throw new Error(`vite ${args.join(" ")} has ended with ${serving.exitCode}`);
+    await new Promise((again) => setTimeout(again, 50));
+  }
 }
 
 async function stopServing(): Promise<void> {
@@ -75,6 +78,7 @@ async function stopServing(): Promise<void> {
 
 async function opened(): Promise<{ page: Page; errors: string[] }> {
   const page = await browser.newPage();
+  page.setDefaultTimeout(100_000);
   const errors: string[] = [];
   page.on("pageerror", ({ message }) => errors.push(message));
   page.on("console", (message) => message.type() === "error" && errors.push(message.text()));
@@ -125,8 +129,9 @@ beforeAll(async () => {
   });
 }, 300_000);
 
+afterEach(stopServing);
+
 afterAll(async () => {
-  await stopServing();
   await browser?.close();
   await service?.stop();
   rmSync(work, { recursive: true, force: true });
@@ -145,7 +150,6 @@ test("it runs on the development server's page, which is of another origin than 
   await page.getByText("The tip is at height 1.").waitFor();
   expect(errors).toEqual([]);
   await page.close();
-  await stopServing();
 }, 120_000);
 
 test("it runs as it is built", async () => {
@@ -156,7 +160,6 @@ test("it runs as it is built", async () => {
   await page.getByText("The tip is at height 1.").waitFor();
   expect(errors).toEqual([]);
   await page.close();
-  await stopServing();
 }, 120_000);
 
 test("it runs through the development server's proxy, and then the page's own origin is the address", async () => {
@@ -173,7 +176,6 @@ test("it runs through the development server's proxy, and then the page's own or
     expect(errors).toEqual([]);
     await page.close();
   } finally {
-    await stopServing();
     rmSync(join(project, "vite.config.js"));
   }
 }, 120_000);
@@ -199,11 +201,10 @@ test.each(["dev", "preview"])(
     if (command === "preview") run(process.execPath, vite(), "build", "--target", "es2022");
     await serve(command);
     const { page, errors } = await opened();
-    await page.getByText("The edge is at height 9.0.").waitFor({ timeout: 60_000 });
+    await page.getByText("The edge is at height 9.0.").waitFor();
     expect(page.workers()).toHaveLength(1);
     expect(errors).toEqual([]);
     await page.close();
-    await stopServing();
   },
   120_000,
 );

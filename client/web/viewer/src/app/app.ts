@@ -181,13 +181,17 @@ export class App implements Workbench {
       setAside: this.#asides.names,
       seamVertices: this.#seams?.copyCount ?? 0,
     });
+    if (this.view.now.colourBy === "texture" && !this.isTextured) this.view.set({ colourBy: "distortion" });
     this.#openPanes();
     this.fit();
   }
 
-  /** Shows somebody else's session, for as long as the page is there; only if `isWatching`. Rejects with an LpdeformError. */
+  /**
+   * Shows somebody else's session, for as long as the page is there; only if `isWatching`. Waits for a server that is away. Rejects
+   * with an LpdeformError if it cannot be watched.
+   */
   async watch(session: string): Promise<void> {
-    const mesh = await watchedMesh(session);
+    const mesh = await watchedMesh(session, (status) => this.facts.set({ status }));
     await prepare(mesh);
     this.#watched = session;
     this.open(mesh, emptyDocument);
@@ -288,7 +292,10 @@ export class App implements Workbench {
   /** What is not symmetric yet stays as it is until it is worked on. */
   setSymmetry(symmetry: Symmetry): void {
     this.view.set({ symmetry });
-    if (symmetry !== "none") this.notify(`What is done on one side of the plane across ${symmetry} is done on the other.`);
+    if (symmetry === "none") return;
+    const hasPlaces = this.document.handles.some(({ targets }) => targets);
+    const but = hasPlaces ? " But handles whose vertices have places of their own are not mirrored." : "";
+    this.notify(`What is done on one side of the plane across ${symmetry} is done on the other.${but}`);
   }
 
   endGesture(): void {

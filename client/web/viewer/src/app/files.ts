@@ -107,9 +107,8 @@ export class Files {
     }
     const { glbOf } = await import("../io/foreign.js");
     const { glb, left } = await glbOf(file);
-    this.#openMesh(await openedMesh(glb, []));
-    const gone = left.length > 0 ? ` Its ${left.join(" and ")} are not taken over.` : "";
-    this.app.notify(`${file.name} is opened as ${glb.name}.${gone}`);
+    const gone = left.length > 0 ? `Its ${left.join(" and ")} are not taken over. ` : "";
+    this.#openMesh(await openedMesh(glb, []), `${file.name} is opened as ${glb.name}. ${gone}`);
   }
 
   /** In the doubles of the server's result, which are more precise than the drawn surface. */
@@ -127,12 +126,13 @@ export class Files {
       if (format === "obj") save(name, obj ? rewriteObj({ ...mesh, obj }, positions) : writeObj(deformed));
       if (format === "off") save(name, writeOff(deformed));
       if (format === "stl") save(name, (await import("../io/write_stl.js")).writeStl(deformed));
-      const lost = lostIn(mesh, format);
-      if (lost.length > 0) {
-        const better = obj || gltf ? ` Saved as ${obj ? "OBJ" : "GLB"}, they stay.` : "";
-        this.app.notify(`${name} does not have what the original file also had: ${lost.join(", ")}.${better}`);
-      }
+      this.#sayLost(name, lostIn(mesh, format), obj || gltf ? ` Saved as ${obj ? "OBJ" : "GLB"}, they stay.` : "");
     }
+  }
+
+  #sayLost(name: string, lost: readonly string[], better = ""): void {
+    if (lost.length === 0) return;
+    this.app.notify(`${name} does not have what the original file also had: ${lost.join(", ")}.${better}`);
   }
 
   async #exactly({ stage, live, distortion }: Pane): Promise<Exported> {
@@ -178,7 +178,11 @@ export class Files {
       const content = as === "glb" ? await posesAsGlb(this.app) : await posesAsVideo(this.app);
       if (content instanceof Blob)
         save(`${this.#stem}-poses.${content.type.startsWith("video/mp4") ? "mp4" : "webm"}`, content);
-      else if (content) save(`${this.#stem}-poses.glb`, content);
+      else if (content) {
+        const name = `${this.#stem}-poses.glb`;
+        save(name, content);
+        this.#sayLost(name, this.app.mesh.beside ?? []);
+      }
     } catch (thrown) {
       this.app.notify(`The poses were not exported. ${sentence((thrown as Error).message)}`, true);
     }
@@ -195,7 +199,8 @@ export class Files {
     return this.app.mesh.name.replace(/\.[^.]*$/, "") || "mesh";
   }
 
-  #openMesh(mesh: Mesh): void {
+  /** `first`: what the user is told before what is said of every mesh. */
+  #openMesh(mesh: Mesh, first = ""): void {
     const { name } = mesh;
     const { p, secondP } = this.app.document;
     this.app.open(mesh, { ...emptyDocument, p, secondP });
@@ -205,7 +210,7 @@ export class Files {
     const count = (mesh.positions.length / 3).toLocaleString("en");
     const { seamVertices } = this.app.facts.now;
     const welded = `, ${seamVertices.toLocaleString("en")} of them copies along seams, welded: the panel “Mesh” has a switch`;
-    this.app.notify(`${name}: ${count} vertices${seamVertices > 0 ? welded : ""}.${up}`);
+    this.app.notify(`${first}${name}: ${count} vertices${seamVertices > 0 ? welded : ""}.${up}`);
   }
 
   #openHandles(name: string, text: string): void {

@@ -1,3 +1,4 @@
+import { LpdeformError } from "lpdeform-client";
 import { morphGlb } from "../io/gltf_morphs.js";
 import { shapesOf } from "../link/prepare.js";
 import { shownOf } from "../model/derived.js";
@@ -19,6 +20,7 @@ const formats = ["video/webm;codecs=vp9", "video/webm", "video/mp4"];
 export interface Film {
   moments: readonly Moment[];
   shapes: readonly Shape[];
+  seconds: number;
 }
 
 /**
@@ -32,25 +34,33 @@ async function film(app: App): Promise<Film | undefined> {
     app.notify("There is nothing to film before there are two poses: “Keep this pose” in the panel “Poses”.", true);
     return undefined;
   }
+  const isAnother = () => app.mesh !== mesh || app.document !== document;
   const room = Math.floor(mostBytes / ((bytesEach * mesh.positions.length) / 3) / poses);
   const moments = momentsOf(document, Math.min(steps, Math.max(room, 1)));
   const shapes: Shape[] = [];
-  const say = () => app.notifyWhile(`Solving for the poses: ${shapes.length + 1} of ${moments.length}…`);
+  const say = () => app.notifyWhile(`Solving for the poses: ${shapes.length + 1} of ${moments.length}… Escape stops it.`);
   let done = say();
+  const over = new AbortController();
+  const stop = ({ code }: KeyboardEvent) => {
+    if (code === "Escape") over.abort(new LpdeformError("cancelled", "Escape was pressed."));
+  };
+  window.addEventListener("keydown", stop);
   try {
     const documents = moments.map((moment) => moment.document);
-    for await (const shape of shapesOf(mesh, documents, seams?.groups, new AbortController().signal)) {
-      if (app.mesh !== mesh || app.document !== document) {
-        app.notify("The work has changed: the poses were not exported.", true);
-        return undefined;
-      }
+    for await (const shape of shapesOf(mesh, documents, seams?.groups, over.signal)) {
+      if (isAnother()) break;
       shapes.push(shape);
       if (shapes.length < moments.length) done = say();
     }
-    return { moments, shapes };
+    return isAnother() ? sayChanged(app) : { moments, shapes, seconds: secondsEach * (poses - 1) };
   } finally {
+    window.removeEventListener("keydown", stop);
     done();
   }
+}
+
+function sayChanged(app: App): undefined {
+  app.notify("The work has changed: the poses were not exported.", true);
 }
 
 /** The poses as a GLB with morph targets and an animation through them, shaded as on the page. */
@@ -58,14 +68,14 @@ export async function posesAsGlb(app: App): Promise<Uint8Array<ArrayBuffer> | un
   const { mesh, seams } = app;
   const made = await film(app);
   if (!made) return undefined;
-  const { moments, shapes } = made;
+  const { moments, shapes, seconds } = made;
   const faces = seams?.faces ?? mesh.faces;
   const draw = new DrawMesh({ positions: mesh.positions, faces }, shownOf(mesh, faces).drawn);
   const stills = shapes.map(({ positions }, k) => {
     draw.take(positions);
     return { name: moments[k]!.name, positions: draw.positions.slice(), normals: draw.normals.slice() };
   });
-  return morphGlb(mesh.name, draw.indices, stills, (secondsEach * (app.document.keyPoses!.length - 1)) / (stills.length - 1));
+  return morphGlb(mesh.name, draw.indices, stills, seconds / (stills.length - 1));
 }
 
 /** The poses as a video of the first picture, as it looks. Undefined if this browser records none, or as film(). */
@@ -82,7 +92,8 @@ export async function posesAsVideo(app: App): Promise<Blob | undefined> {
   const done = app.notifyWhile("Recording the poses…");
   app.view.set({ selected: undefined });
   try {
-    return await recorded(app, made.shapes, mimeType);
+    const video = await recorded(app, made, mimeType);
+    return app.mesh === mesh ? video : sayChanged(app);
   } finally {
     done();
     app.endPreview(false);
@@ -93,7 +104,7 @@ export async function posesAsVideo(app: App): Promise<Blob | undefined> {
 /**
  * Shows the shapes one after the other, and records a copy of each picture: the size of the stage's own changes if drawing is slow.
  */
-async function recorded(app: App, shapes: readonly Shape[], mimeType: string): Promise<Blob> {
+async function recorded(app: App, { shapes, seconds }: Film, mimeType: string): Promise<Blob> {
   const { stage } = app.panes[0]!;
   const canvas = document.createElement("canvas");
   const ratio = Math.min(devicePixelRatio, 2);
@@ -113,7 +124,7 @@ async function recorded(app: App, shapes: readonly Shape[], mimeType: string): P
     app.preview(shapes[0]!);
     await nextPicture(app);
     recorder.start();
-    await play(app, shapes, (app.document.keyPoses!.length - 1) * secondsEach);
+    await play(app, shapes, seconds);
     recorder.stop();
     await stopped;
   } finally {

@@ -209,14 +209,14 @@ export class Pane {
     if (this.#dressed === surface || !gltf) return;
     this.#dressed = surface;
     try {
-      const [{ readGltfTextures }, { decoded, Textured }] = await Promise.all([
+      const [{ readGltfTextures }, { closeAll, decoded, Textured }] = await Promise.all([
         import("../io/gltf_textures.js"),
         import("../stage/textured.js"),
       ]);
       const texturing = readGltfTextures(name, gltf);
       const images = await decoded(texturing.layers);
-      if (this.stage.surface !== surface) return;
-      const missing = texturing.layers.filter(({ image }, k) => image && !images[k]).length;
+      if (this.stage.surface !== surface) return closeAll(images);
+      const missing = new Set(texturing.layers.map(({ image }, k) => (images[k] ? undefined : image)).filter(Boolean)).size;
       if (missing > 0) this.watcher.notice(`${missing} textures of ${name} are images that this browser does not show.`);
       surface.dress((indices, makeMaterial) => new Textured({ indices }, texturing, images, makeMaterial));
       this.watcher.dressed();

@@ -11,8 +11,8 @@ keysText.id = "picture-keys";
 keysText.className = "unseen";
 keysText.textContent =
   "Enter shows a cross: arrow keys move it, Enter places a handle there or selects the one that is there, Escape hides it. " +
-  "Arrow keys and Page Up and Down move the selected handle, or turn it if it has rings (R); without a selection they turn the " +
-  "view. Control and arrow keys turn the view, with Shift they shift it; plus and minus zoom.";
+  "Arrow keys and Page Up and Down move the selected handle, turn it if it has rings (R), or scale it if it has cubes (Z); without a " +
+  "selection they turn the view. Control and arrow keys turn the view, with Shift they shift it; plus and minus zoom.";
 
 /** The worst first. */
 const worse: readonly Status["kind"][] = ["refused", "full", "draining", "away", "opening", "idle", "live"];

@@ -1,14 +1,12 @@
 import { LoadingManager, type Material, Mesh, MeshStandardMaterial, type MeshPhongMaterial, type Object3D } from "three";
 import { FileFault } from "./fault.js";
+import { checkUnpackedFbx, checkUnpackedZip } from "./unpacked.js";
 
 // FBX, COLLADA and 3MF, as three.js reads them. They become a GLB, which is opened as any other, with names, colours, texture
 // coordinates, skins and morph targets. Textures and animations are left out. Nothing that a file names is loaded from anywhere.
 
 const kinds = { fbx: "FBX", dae: "COLLADA", "3mf": "3MF" } as const;
 type Kind = keyof typeof kinds;
-
-/** More than that, unpacked, is no 3MF that a page can show. */
-const mostUnpackedBytes = 500e6;
 
 /**
  * The file as a GLB, and what it had that is left out, in words. Needs the page's XML, which workers do not have. The reader of
@@ -33,6 +31,7 @@ export async function glbOf(file: File): Promise<{ glb: File; left: readonly str
 
 const readers: Record<Kind, (bytes: Uint8Array<ArrayBuffer>) => Promise<Object3D>> = {
   async fbx(bytes) {
+    await checkUnpackedFbx(bytes);
     const { FBXLoader } = await import("three/addons/loaders/FBXLoader.js");
     return new FBXLoader(nothingElse()).parse(bytes.buffer, "");
   },
@@ -43,7 +42,7 @@ const readers: Record<Kind, (bytes: Uint8Array<ArrayBuffer>) => Promise<Object3D
     return read.scene;
   },
   async "3mf"(bytes) {
-    await refuseBombs(bytes);
+    await checkUnpackedZip(bytes);
     const { ThreeMFLoader } = await import("three/addons/loaders/3MFLoader.js");
     const scene = new ThreeMFLoader(nothingElse()).parse(bytes.buffer) as Object3D | null;
     if (!scene) throw new Error("its parts are not those of a 3MF file");
@@ -57,26 +56,20 @@ function nothingElse(): LoadingManager {
   return new LoadingManager().setURLModifier(() => "data:,");
 }
 
-/** The reader of three.js gives each part of a ZIP file the room that it claims, and no more. */
-async function refuseBombs(bytes: Uint8Array<ArrayBuffer>): Promise<void> {
-  const { unzipSync } = await import("three/addons/libs/fflate.module.js");
-  let size = 0;
-  const measure = ({ originalSize }: { originalSize: number }) => {
-    size += originalSize;
-    return false;
-  };
-  unzipSync(bytes, { filter: measure });
-  if (size > mostUnpackedBytes) throw new Error(`unpacked it has ${size} bytes, and this page takes ${mostUnpackedBytes}`);
-}
+let readings = 0;
+let loud: Pick<Console, "warn" | "error" | "log">;
 
 /** The readers tell the console what they do not know; what they cannot read they throw, or return nothing. */
 async function quietly<Value>(read: () => Promise<Value>): Promise<Value> {
-  const { warn, error, log } = console;
-  console.warn = console.error = console.log = () => undefined;
+  if (readings++ === 0) {
+    const { warn, error, log } = console;
+    loud = { warn, error, log };
+    console.warn = console.error = console.log = () => undefined;
+  }
   try {
     return await read();
   } finally {
-    Object.assign(console, { warn, error, log });
+    if (--readings === 0) Object.assign(console, loud);
   }
 }
 

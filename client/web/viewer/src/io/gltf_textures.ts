@@ -1,6 +1,6 @@
 import type { Texturing, TextureLayer } from "../model/texturing.js";
 import { readNumbers } from "./gltf_accessors.js";
-import { type DrawPart, readBlocks } from "./gltf_blocks.js";
+import { type Block, type DrawPart, readBlocks } from "./gltf_blocks.js";
 import { bytesAt, type GltfDocument, indexOf, listOf, nameOf, type Part, partOf, readGltfDocument } from "./gltf_document.js";
 
 const clampToEdge = 33071;
@@ -9,15 +9,61 @@ const clampToEdge = 33071;
 export function readGltfTextures(name: string, bytes: Uint8Array): Texturing {
   const document = readGltfDocument(name, bytes, new Map());
   const { parts, faces, vertexCount } = readBlocks(document);
-  const coordinates = new Float32Array(2 * vertexCount);
+  const places = new Places(document, vertexCount);
+  const images = new Map<number, Blob | undefined>();
+  const corners = Uint32Array.from(faces);
   const layers = parts.map((part) => {
     const material = materialOf(document.json, part);
     const texture = partOf(material["baseColorTexture"]);
-    const has = takeCoordinates(document, part, texture, coordinates);
-    const image = has ? imageOf(document, texture) : undefined;
-    return { ...layerOf(document.json, part, material, texture), ...(image && { image }) };
+    const layer = layerOf(document.json, part, material, texture);
+    const accessor = coordinatesOf(document.json, part, texture);
+    if (accessor === undefined) return layer;
+    const moved = places.of(part.block, accessor) - part.block.first;
+    const end = 3 * (part.firstFace + part.faceCount);
+    for (let corner = 3 * part.firstFace; moved > 0 && corner < end; ++corner) corners[corner]! += moved;
+    const index = sourceOf(document.json, texture);
+    if (!images.has(index)) images.set(index, imageOf(document, index));
+    const image = images.get(index);
+    return { ...layer, ...(image && { image }) };
   });
-  return { coordinates, corners: Uint32Array.from(faces), layers };
+  return { coordinates: places.coordinates, corners, layers };
+}
+
+/**
+ * Places in images, as accessors have them. A block's are where its vertices are, unless its primitives have several accessors: those
+ * of the second and later ones are behind all vertices.
+ */
+class Places {
+  readonly #firsts = new Map<Block, Map<number, number>>();
+  readonly #pieces: { first: number; numbers: Float64Array }[] = [];
+  #count: number;
+
+  constructor(
+    readonly document: GltfDocument,
+    vertexCount: number,
+  ) {
+    this.#count = vertexCount;
+  }
+
+  /** Where those of the block begin. */
+  of(block: Block, accessor: number): number {
+    const firsts = this.#firsts.get(block) ?? new Map<number, number>();
+    this.#firsts.set(block, firsts);
+    const known = firsts.get(accessor);
+    if (known !== undefined) return known;
+    const first = firsts.size === 0 ? block.first : this.#count;
+    const numbers = readNumbers(this.document, accessor, 2).subarray(0, 2 * block.count);
+    if (firsts.size > 0) this.#count += block.count;
+    firsts.set(accessor, first);
+    this.#pieces.push({ first, numbers });
+    return first;
+  }
+
+  get coordinates(): Float32Array {
+    const all = new Float32Array(2 * this.#count);
+    for (const { first, numbers } of this.#pieces) all.set(numbers, 2 * first);
+    return all;
+  }
 }
 
 function primitiveOf(json: Part, { block, primitive }: DrawPart): Part {
@@ -41,25 +87,25 @@ function layerOf(json: Part, { firstFace, faceCount }: DrawPart, material: Part,
   return { firstFace, faceCount, colour: [r, g, b], isRepeated: wrapS !== clampToEdge };
 }
 
-/** Writes the places in the image of the part's vertices. False if they have none. */
-function takeCoordinates(document: GltfDocument, part: DrawPart, texture: Part, into: Float32Array): boolean {
-  if (texture["index"] === undefined) return false;
-  const { json } = document;
+/** The accessor of the places in the image of the part's vertices, if they have any. */
+function coordinatesOf(json: Part, part: DrawPart, texture: Part): number | undefined {
+  if (texture["index"] === undefined) return undefined;
   const key = `TEXCOORD_${Number(texture["texCoord"] ?? 0)}`;
   const accessor = partOf(primitiveOf(json, part)["attributes"])[key];
-  if (accessor === undefined) return false;
-  const numbers = readNumbers(document, indexOf(json, accessor, "accessors", nameOf(json, "meshes", part.block.mesh)), 2);
-  const { first, count } = part.block;
-  into.set(numbers.subarray(0, 2 * count), 2 * first);
-  return true;
+  if (accessor === undefined) return undefined;
+  return indexOf(json, accessor, "accessors", nameOf(json, "meshes", part.block.mesh));
+}
+
+/** The number of the texture's image. */
+function sourceOf(json: Part, texture: Part): number {
+  const { source, extensions } = partOf(listOf(json, "textures")[texture["index"] as number]);
+  const webp = partOf(partOf(extensions)["EXT_texture_webp"])["source"];
+  return (webp ?? source) as number;
 }
 
 /** Undefined if it is not in the file. */
-function imageOf(document: GltfDocument, texture: Part): Blob | undefined {
-  const { json, buffer } = document;
-  const { source, extensions } = partOf(listOf(json, "textures")[texture["index"] as number]);
-  const webp = partOf(partOf(extensions)["EXT_texture_webp"])["source"];
-  const image = partOf(listOf(json, "images")[(webp ?? source) as number]);
+function imageOf({ json, buffer }: GltfDocument, index: number): Blob | undefined {
+  const image = partOf(listOf(json, "images")[index]);
   const view = partOf(listOf(json, "bufferViews")[image["bufferView"] as number]);
   const { byteOffset = 0, byteLength = 0 } = view as { byteOffset?: number; byteLength?: number };
   const bytes =

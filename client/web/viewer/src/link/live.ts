@@ -280,7 +280,7 @@ export class Live {
       const error = thrown as LpdeformError;
       askedMs = error.retryAfterMs;
       if (this.#over.signal.aborted) return { hadFrames, askedMs };
-      this.#setStatus(this.watched ? watchedStatus(error) : statusAtEnd(error));
+      this.#setStatus(this.watched ? watchedStatus(error, statusAtEnd(error)) : statusAtEnd(error));
       void session.close().catch(() => undefined);
       this.#session = undefined;
     }

@@ -27,7 +27,7 @@ export function partnerOf(handles: readonly Handle[], { vertices }: Handle, mirr
 
 /**
  * The document with what has changed since `before` done on the other side, too. If both of two partners have changed, the one
- * that comes first in `leading` counts. A handle on the plane stays on it.
+ * that comes first in `leading` counts. A handle on the plane stays on it when it is moved.
  */
 export function symmetric(before: Document, after: Document, mirror: Mirror, leading: readonly string[]): Document {
   if (before.handles === after.handles) return after;
@@ -40,7 +40,8 @@ export function symmetric(before: Document, after: Document, mirror: Mirror, lea
     const partner = partnerOf(after.handles, handle, mirror);
     if (!partner || done.has(handle.name)) continue;
     done.add(partner.name);
-    const change = partner === handle ? onPlane(handle, mirror) : imageOf(old.get(handle.name)!, handle, partner, mirror);
+    const before = old.get(handle.name)!;
+    const change = partner === handle ? onPlane(before, handle, mirror) : imageOf(before, handle, partner, mirror);
     result = changeHandle(result, partner.name, change);
   }
   return withoutPartners(before, result, mirror);
@@ -81,9 +82,9 @@ function mirrored({ rotation, translation, center, ...scale }: Pose, mirror: Mir
   };
 }
 
-/** Without what would leave the plane: movement across it, and turns about axes in it. */
-function onPlane({ pose, targets }: Handle, { axis }: Mirror): Partial<Handle> {
-  if (targets) return {};
+/** A new pose without what would leave the plane: movement across it, and turns about axes in it. */
+function onPlane(old: Handle, { pose, targets }: Handle, { axis }: Mirror): Partial<Handle> {
+  if (pose === old.pose || targets) return {};
   const translation = pose.translation.map((value, k) => (k === axis ? 0 : value)) as unknown as Pose["translation"];
   const length = Math.hypot(pose.rotation[axis], pose.rotation[3]);
   const rotation = pose.rotation.map((value, k) => (k === axis || k === 3 ? value / length : 0)) as unknown as Quaternion;

@@ -15,9 +15,10 @@ export class Textured {
   /** For each vertex the one that is drawn otherwise. */
   readonly #source: Uint32Array;
   readonly #materials: readonly three.ShaderMaterial[];
+  readonly #textures: three.Texture[] = [];
   readonly #geometry = new three.BufferGeometry();
 
-  /** `makeMaterial`: the surface's, for one layer. */
+  /** `images`: those of the layers, which the object closes in the end. `makeMaterial`: the surface's, for one layer. */
   constructor(
     { indices }: Pick<Drawn, "indices">,
     { coordinates, corners, layers }: Texturing,
@@ -44,9 +45,24 @@ export class Textured {
     }
     this.#geometry.setAttribute("place", new three.Float32BufferAttribute(places, 2));
     layers.forEach(({ firstFace, faceCount }, k) => this.#geometry.addGroup(3 * firstFace, 3 * faceCount, k));
-    this.#materials = layers.map((layer, k) => layerMaterial(makeMaterial(), layer, images[k]));
+    this.#materials = layers.map((layer, k) => layerMaterial(makeMaterial(), layer, this.#textureOf(images[k], layer)));
     this.object = new three.Mesh(this.#geometry, [...this.#materials]);
     this.object.frustumCulled = false;
+  }
+
+  /** The same for layers that show an image alike. */
+  #textureOf(image: ImageBitmap | undefined, { isRepeated }: TextureLayer): three.Texture | undefined {
+    if (!image) return undefined;
+    const wrap = isRepeated ? three.RepeatWrapping : three.ClampToEdgeWrapping;
+    const known = this.#textures.find((texture) => texture.image === image && texture.wrapS === wrap);
+    if (known) return known;
+    const texture = new three.Texture(image);
+    texture.flipY = false;
+    texture.wrapS = texture.wrapT = wrap;
+    texture.anisotropy = 4;
+    texture.needsUpdate = true;
+    this.#textures.push(texture);
+    return texture;
   }
 
   move({ positions, normals }: Pick<Drawn, "positions" | "normals">): void {
@@ -69,39 +85,37 @@ export class Textured {
 
   dispose(): void {
     this.#geometry.dispose();
-    for (const material of this.#materials) {
-      (material.uniforms["image"]?.value as three.Texture | null)?.dispose();
-      material.dispose();
-    }
+    for (const material of this.#materials) material.dispose();
+    for (const texture of this.#textures) texture.dispose();
+    closeAll(this.#textures.map(({ image }) => image as ImageBitmap));
   }
 }
 
 function layerMaterial(
   material: three.ShaderMaterial,
-  { colour, isRepeated }: TextureLayer,
-  image: ImageBitmap | undefined,
+  { colour }: TextureLayer,
+  texture: three.Texture | undefined,
 ): three.ShaderMaterial {
   const { r, g, b } = new three.Color(...colour).convertLinearToSRGB();
   material.uniforms["plain"]!.value = new three.Vector3(r, g, b);
   material.uniforms["colourful"]!.value = 0;
-  if (!image) return material;
-  const texture = new three.Texture(image);
-  texture.flipY = false;
-  texture.wrapS = texture.wrapT = isRepeated ? three.RepeatWrapping : three.ClampToEdgeWrapping;
-  texture.anisotropy = 4;
-  texture.needsUpdate = true;
+  if (!texture) return material;
   material.uniforms["image"] = { value: texture };
   material.defines = { ...material.defines, TEXTURED: "" };
   return material;
 }
 
-/** Undefined for those that cannot be shown. */
+/** Each image once. Undefined for those that cannot be shown. */
 export function decoded(layers: readonly TextureLayer[]): Promise<(ImageBitmap | undefined)[]> {
-  return Promise.all(
-    layers.map(({ image }) =>
-      image
-        ? createImageBitmap(image, { colorSpaceConversion: "none", premultiplyAlpha: "none" }).catch(() => undefined)
-        : undefined,
-    ),
-  );
+  const known = new Map<Blob, Promise<ImageBitmap | undefined>>();
+  const decode = (image: Blob) => {
+    const bitmap = createImageBitmap(image, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+    return bitmap.catch(() => undefined);
+  };
+  for (const { image } of layers) if (image && !known.has(image)) known.set(image, decode(image));
+  return Promise.all(layers.map(({ image }) => image && known.get(image)));
+}
+
+export function closeAll(images: readonly (ImageBitmap | undefined)[]): void {
+  for (const image of new Set(images)) image?.close();
 }

@@ -17,7 +17,8 @@ export function shareLink(app: App): void {
       "p",
       {},
       "Whoever opens this link sees the shape as you change it, and turns it as they like. Whoever knows it can also change the session by " +
-        "other programs, so give it to people whom you trust. It ends when you close this page or open another shape.",
+        "other programs, so give it to people whom you trust. It ends when you open another shape, or ten minutes after the last page " +
+        "has left it.",
     ),
     link,
     el("div", { className: "pose-actions" }, copy, close),

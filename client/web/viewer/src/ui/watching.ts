@@ -1,6 +1,6 @@
 import type { LpdeformError } from "lpdeform-client";
 import type { App } from "../app/app.js";
-import { sessionOf, watchedStatus } from "../link/watched.js";
+import { sessionOf, watchedIn, watchedStatus } from "../link/watched.js";
 import { say } from "../link/status.js";
 import { button } from "./controls.js";
 import { el } from "./dom.js";
@@ -9,6 +9,11 @@ import { legend } from "./legend.js";
 import { lookPanel } from "./look.js";
 import { messages } from "./messages.js";
 import { title } from "./topbar.js";
+
+/** What the page's address names, to be watched. Null: it is that of a page to work in. */
+export function watchedHere(): string | null {
+  return watchedIn(location.hash);
+}
 
 /** The page of somebody who watches the session that a link names. It changes nothing. */
 export function watchingPage(app: App, watched: string): Node[] {

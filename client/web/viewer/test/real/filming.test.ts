@@ -2,6 +2,7 @@ import { writeFileSync } from "node:fs";
 import { beforeAll, expect, it } from "vitest";
 import { readGltfDocument } from "../../src/io/gltf_document.js";
 import { faultsOf } from "../gltf_validator.js";
+import { columns, makeGlb, rows } from "../made_glb.js";
 import { bar, withUser } from "./opened.js";
 import type { User } from "./user.js";
 
@@ -19,6 +20,19 @@ it("without two poses there is nothing to export, which is said", async () => {
   await user.page.getByRole("button", { name: "Save" }).click();
   await user.page.getByRole("menuitem", { name: "Poses as video" }).click();
   await user.page.locator(".notice.bad", { hasText: "two poses" }).waitFor();
+});
+
+it("Escape ends waiting for a server that does not answer", async () => {
+  await keep();
+  const requests = "**/lpdeform.v1.*/CreateSession";
+  await user.page.route(requests, () => undefined); // without an answer
+  await user.page.getByRole("button", { name: "Save" }).click();
+  await user.page.getByRole("menuitem", { name: "Poses as GLB" }).click();
+  await user.page.locator(".notice", { hasText: "Solving for the poses: 1 of" }).waitFor();
+  await user.page.keyboard.press("Escape");
+  await user.page.locator(".notice.bad", { hasText: "The poses were not exported." }).waitFor();
+  await user.page.unroute(requests);
+  await user.page.getByRole("button", { name: "Delete Pose 2" }).click();
 });
 
 it("poses are exported as morph targets, solved in between, and validated", async () => {
@@ -68,24 +82,45 @@ it("poses are recorded as a video of the picture, whose last picture is the last
       }
       return sum / count;
     };
-    const middles: number[] = [];
-    const each = () => {
-      middles.push(middle());
-      element.requestVideoFrameCallback(each);
+    const at = async (seconds: number) => {
+      const sought = new Promise((resolve) => (element.onseeked = resolve));
+      element.currentTime = seconds;
+      await sought;
+      return middle();
     };
-    element.requestVideoFrameCallback(each);
-    await new Promise((resolve) => {
-      element.onended = resolve;
-      void element.play();
-    });
-    return { width, height, middles, seconds: element.currentTime };
+    const last = await at(1e9); // as far as it goes
+    const seconds = element.currentTime;
+    return { width, height, seconds, last, half: await at(seconds / 2), first: await at(0) };
   }, video.toString("base64"));
   expect(pictures.seconds).toBeGreaterThan(1.5);
-  const { middles } = pictures;
-  expect(middles.length).toBeGreaterThan(5);
-  expect(middles.every((middle) => middle > 0)).toBe(true); // no picture is empty
-  expect(middles.at(-1)).toBeGreaterThan(middles[0]! + 20);
+  const { first, half, last } = pictures;
+  expect(half).toBeGreaterThan(first + 5);
+  expect(last).toBeGreaterThan(half + 5);
   const size = await user.page.locator("canvas.stage").evaluate((canvas) => (canvas as HTMLCanvasElement).clientWidth);
   expect(pictures.width).toBeGreaterThan(0.3 * size);
   expect(await user.ask("app.view.now.selected")).toBe(before);
+});
+
+it("nothing is saved if another mesh is opened while the video is recorded", async () => {
+  let downloads = 0;
+  user.page.on("download", () => ++downloads);
+  await user.page.getByRole("button", { name: "Save" }).click();
+  await user.page.getByRole("menuitem", { name: "Poses as video" }).click();
+  await user.page.locator(".notice", { hasText: "Recording" }).waitFor({ timeout: 60_000 });
+  await user.ask(`app.openShape("sheet", "coarse")`);
+  await user.page.locator(".notice.bad", { hasText: "The work has changed" }).waitFor();
+  await user.settled();
+  expect(downloads).toBe(0);
+});
+
+it("what the file of the mesh also had is not in a GLB of its poses, and the page says so", async () => {
+  await user.openFiles({ name: "tube.glb", content: Buffer.from(makeGlb()) });
+  await user.until(`window.__lpdeform.app.mesh.name === "tube.glb"`);
+  const ends = [0, rows].map((row) => Array.from({ length: columns + 1 }, (_, column) => row * (columns + 1) + column));
+  const handles = ends.map((vertices, k) => ({ name: `end ${k}`, vertices }));
+  await user.openFiles({ name: "h.json", content: JSON.stringify({ handles }) });
+  await keep();
+  await keep();
+  await user.save("Poses as GLB, with morph targets");
+  await user.page.locator(".notice", { hasText: /tube-poses.glb does not have what .* also had: .*materials/ }).waitFor();
 });

@@ -7,7 +7,7 @@ import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
 import { readMesh } from "../../src/io/read.js";
 import { faultsOf } from "../gltf_validator.js";
-import { columns, make3mf, makeDae, makeFbx } from "../made_foreign.js";
+import { columns, make3mf, makeBinaryFbx, makeDae, makeFbx } from "../made_foreign.js";
 import { User } from "./user.js";
 
 const dist = join(import.meta.dirname, "../../dist");
@@ -54,6 +54,7 @@ describe("the viewer", () => {
     async (name) => {
       await user.openFiles({ name, content: files[name] });
       await notice(`${name} is opened as tube.glb.`);
+      await notice("Shown with y up");
       await user.settled();
       const positions = await user.positions();
       const heights = positions.filter((_, k) => k % 3 === 1);
@@ -92,6 +93,8 @@ describe("the viewer", () => {
     ["a.dae", '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"></COLLADA>', "a.dae"],
     ["a.3mf", "PK", "a.3mf cannot be read as 3MF"],
     ["a.3mf", Buffer.from(make3mf(501e6)), "a.3mf cannot be read as 3MF: unpacked it has 501"],
+    ["a.fbx", makeBinaryFbx(7400, 63e6), "a.fbx cannot be read as FBX: unpacked it has 50"],
+    ["a.fbx", makeBinaryFbx(7500, 63e6), "a.fbx cannot be read as FBX: unpacked it has 50"],
   ])("refuses %s with a sentence", async (name, content, words) => {
     await user.openFiles({ name, content });
     await notice(words);
@@ -117,6 +120,18 @@ describe("hostile files", () => {
   afterAll(async () => {
     await bare.stop();
     rmSync(folder, { recursive: true });
+  });
+
+  it("leave the page its console, also if two are read at once", async () => {
+    const isHeard = await page.evaluate(
+      async (dae) => {
+        const { log } = console;
+        await Promise.all([window.convert("a.dae", dae), window.convert("b.dae", dae)]);
+        return console.log === log;
+      },
+      [...files["tube.dae"]],
+    );
+    expect(isHeard).toBe(true);
   });
 
   it("are read or refused by a sentence about the file, however they are damaged", async () => {

@@ -9,12 +9,12 @@ export const bar = "/?shape=bar&detail=coarse";
 
 /** A server with the page, for the whole file. */
 export function withService(taken: (service: Service) => void): void {
-  let service: Service;
+  let service: Service | undefined;
   beforeAll(async () => {
     service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
     taken(service);
   });
-  afterAll(() => service.stop());
+  afterAll(() => service?.stop());
 }
 
 type Options = Parameters<typeof User.open>[1];
@@ -37,6 +37,7 @@ export function withNewUsers(path: string, taken: (user: User, service: Service)
   let user: User | undefined;
   withService((started) => (service = started));
   beforeEach(async () => {
+    user = undefined;
     user = await opened(service, path, options);
     taken(user, service);
   });
@@ -50,6 +51,7 @@ async function opened(service: Service, path: string, options?: Options): Promis
 }
 
 async function closed(user: User | undefined): Promise<void> {
-  expect(user?.errors).toEqual([]);
-  await user?.close();
+  if (!user) return;
+  await user.close();
+  expect(user.errors).toEqual([]);
 }

@@ -68,4 +68,7 @@ it("the texture of a GLB is shown where the file has it, and bends with the surf
   if (process.env["SHOT"]) await user.page.screenshot({ path: `${process.env["SHOT"]}-texture.png` });
   await button("Distortion").click();
   await expect.poll(async () => isRed(await user.colourAt(after)), { timeout: 20_000 }).toBe(false);
+  await button("Texture").click();
+  await user.ask(`app.openShape("sheet", "coarse")`);
+  expect(await user.ask("app.view.now.colourBy")).toBe("distortion");
 });

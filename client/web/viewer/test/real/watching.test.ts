@@ -64,13 +64,22 @@ it("a link shows others the shape as it is and as it changes, and they change no
   await close(one);
 });
 
-it("a link that is cut off, or of a session that is not there, says so", async () => {
-  for (const [watched, text] of [
-    ["12ab", "This link is not whole"],
-    ["0".repeat(32), "This session has ended"],
-  ]) {
-    const watcher = await User.open(`${service.url}/?watch=${watched}`);
-    await watcher.page.getByRole("alert").getByText(text!).waitFor();
-    await close(watcher);
-  }
+it("a link that is opened while the server is away shows the shape once it is back", async () => {
+  const watched = await link();
+  const watcher = await User.open("about:blank");
+  const requests = "**/lpdeform.v1.*/**";
+  await watcher.page.route(requests, (route) => route.abort());
+  await watcher.page.goto(watched);
+  await watcher.page.getByRole("alert").getByText("The server is away").waitFor();
+  await watcher.page.unroute(requests);
+  await watcher.until("window.__lpdeform?.status() === 'live' && window.__lpdeform.positions().length > 0");
+  await close(watcher);
+});
+
+it("a link that is cut off, or of a session that is not there, says so, also if it is opened in the page of another", async () => {
+  const watcher = await User.open(`${service.url}/#watch=12ab`);
+  await watcher.page.getByRole("alert").getByText("This link is not whole").waitFor();
+  await watcher.page.goto(`${service.url}/#watch=${"0".repeat(32)}`);
+  await watcher.page.getByRole("alert").getByText("This session has ended").waitFor();
+  await close(watcher);
 });
