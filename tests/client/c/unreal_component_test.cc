@@ -130,5 +130,14 @@ TEST_F(UnrealComponent, SaysWhatIsRefusedOnceAndRests) {
   EXPECT_EQ(vertex(21), FVector(1000, 0, 0));  // the mesh stays as it is
 }
 
+TEST_F(UnrealComponent, SaysOnceThatNoServerAnswers) {
+  component_.Address = "127.0.0.1:1";
+  component_.BeginPlay();
+  ASSERT_TRUE(tick_until([] { return !unreal_logs.empty(); }));
+  EXPECT_NE(unreal_logs[0].find("trying again"), std::string::npos) << unreal_logs[0];
+  for (int k = 0; k < 30; ++k) component_.TickComponent(0.016F, LEVELTICK_All, nullptr);
+  EXPECT_EQ(unreal_logs.size(), 1u);
+}
+
 }  // namespace
 }  // namespace lpdeform

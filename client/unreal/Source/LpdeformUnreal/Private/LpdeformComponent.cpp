@@ -114,7 +114,7 @@ void ULpdeformComponent::TickComponent(float Seconds, ELevelTick Tick, FActorCom
   const bool bIsOver = Follower->is_over();
   const std::string Problem = Follower->problem();
   if (!Problem.empty()) UE_LOG(LogTemp, Warning, TEXT("lpdeform: %s"), UTF8_TO_TCHAR(Problem.c_str()));
-  const std::string Trouble = Follower->trouble();
+  const std::string Trouble = bIsOver ? "" : Follower->trouble();
   if (!Trouble.empty() && !bWasInTrouble) UE_LOG(LogTemp, Warning, TEXT("lpdeform: %s; trying again"), UTF8_TO_TCHAR(Trouble.c_str()));
   bWasInTrouble = !Trouble.empty();
   const std::string Notice = Follower->notice();
