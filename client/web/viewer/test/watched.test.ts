@@ -15,7 +15,7 @@ it("a link names the session and nothing of what the page shows besides, and com
   }
 });
 
-it("who watches is told whether it is over, will come back, or is not allowed", () => {
+it("a watcher is told whether the session is over, will come back, or is not allowed", () => {
   const kind = (error: LpdeformError) => [watchedStatus(error).kind, watchedStatus(error).title];
   expect(kind(new LpdeformError("not_found", "x", { reason: "SESSION_UNKNOWN" }))).toEqual([
     "refused",

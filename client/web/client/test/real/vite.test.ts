@@ -86,6 +86,14 @@ async function opened(): Promise<{ page: Page; errors: string[] }> {
   return { page, errors };
 }
 
+/** The README's program bends the tube in the page. */
+async function runs(): Promise<void> {
+  const { page, errors } = await opened();
+  await page.getByText("The tip is at height 1.").waitFor();
+  expect(errors).toEqual([]);
+  await page.close();
+}
+
 beforeAll(async () => {
   work = mkdtempSync(join(tmpdir(), "lpdeform-vite-"));
   project = join(work, "page");
@@ -146,20 +154,14 @@ test("it type-checks as it stands, without skipLibCheck", () => {
 test("it runs on the development server's page, which is of another origin than the proxy", async () => {
   writeFileSync(join(project, "main.ts"), program(JSON.stringify(service.url)));
   await serve();
-  const { page, errors } = await opened();
-  await page.getByText("The tip is at height 1.").waitFor();
-  expect(errors).toEqual([]);
-  await page.close();
+  await runs();
 }, 120_000);
 
 test("it runs as it is built", async () => {
   writeFileSync(join(project, "main.ts"), program(JSON.stringify(service.url)));
   run(process.execPath, vite(), "build", "--target", "es2022");
   await serve("preview");
-  const { page, errors } = await opened();
-  await page.getByText("The tip is at height 1.").waitFor();
-  expect(errors).toEqual([]);
-  await page.close();
+  await runs();
 }, 120_000);
 
 test("it runs through the development server's proxy, and then the page's own origin is the address", async () => {
@@ -171,10 +173,7 @@ test("it runs through the development server's proxy, and then the page's own or
   writeFileSync(join(project, "main.ts"), program("location.origin"));
   try {
     await serve();
-    const { page, errors } = await opened();
-    await page.getByText("The tip is at height 1.").waitFor();
-    expect(errors).toEqual([]);
-    await page.close();
+    await runs();
   } finally {
     rmSync(join(project, "vite.config.js"));
   }

@@ -59,7 +59,7 @@ async function readMesh(session: string): Promise<Mesh> {
 /** What an error means to somebody who watches. `status`: what it means to somebody who works. */
 export function watchedStatus(error: LpdeformError, status = statusOf(error)): Status {
   if (error.code === "not_found" || error.reason.startsWith("SESSION_")) {
-    const text = "Whoever works on it has closed it or opened something else. Ask for a new link.";
+    const text = "The page that it came from was closed, or shows another shape now. Ask for a new link.";
     return say("refused", "This session has ended, or is not yours to see", text);
   }
   return isPassing(status)

@@ -16,9 +16,9 @@ export function shareLink(app: App): void {
     el(
       "p",
       {},
-      "Whoever opens this link sees the shape as you change it, and turns it as they like. Whoever knows it can also change the session by " +
-        "other programs, so give it to people whom you trust. It ends when you open another shape, or ten minutes after the last page " +
-        "has left it.",
+      "People who open this link see the shape as you change it, and can turn the view. With other programs they can also change the " +
+        "shape, so give the link to people whom you trust. The link ends when you open another shape, or ten minutes after the last " +
+        "page has left it.",
     ),
     link,
     el("div", { className: "pose-actions" }, copy, close),
