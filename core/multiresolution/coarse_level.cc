@@ -138,7 +138,8 @@ Points CoarseLevel::prolong(const RestShape& fine, const Workers& workers) const
 }
 
 bool CoarseLevel::can_bend_like_fine() const {
-  return coarse_vertex_.size() >= kLeastEased && shape_->weight_kind() != WeightKind::kUniform;
+  return (bending_ < 1 || coarse_vertex_.size() >= kLeastEased) &&
+         shape_->weight_kind() != WeightKind::kUniform;
 }
 
 void CoarseLevel::bend_like_fine() {

@@ -11,6 +11,9 @@ constexpr double kCoarseTolerance = 1e-4;       // relative, of E^(1/p); the lev
 constexpr double kRoughCoarseTolerance = 1e-3;  // if some p_i < 2 and the first minimum is taken as it comes
 constexpr double kFirstTolerance = 1e-2;        // if the cells bend like the fine ones afterwards
 constexpr double kEasedTolerance = 3e-3;        // where they do
+constexpr double kGentleTolerance = 1e-2;       // where they do from the beginning
+constexpr double kLowestTolerance = 1e-4;       // where they do on the level below all others
+constexpr double kGentleStrain = 0.3;  // handles have moved little if no cell of the guess is strained more
 constexpr int kCostOfLook = 5;  // looking at the coarse level takes at most one part in this many of the time
 
 }  // namespace
@@ -20,13 +23,32 @@ Multiresolution::Multiresolution(Problem problem, Points x, CoarseLevel& level, 
   objective_ = problem_.objective.reweigh(problem_.norm);
   SolveSettings settings;
   settings.initial = InitialGuess::kLaplacian;
+  if (level_.can_bend_like_fine() && level_.has_level_below() && !is_search_ && is_gentle()) {
+    is_eased_ = true;
+    level_.bend_like_fine();
+  }
   settings.tolerance = std::max(problem_.tolerance, first_tolerance());
   settings.effort = effort;
   if (!level_.solver().start(settings, problem_.stop).ok())
     fine_ = std::make_unique<QuasiNewton>(problem_, x_, Warmth::kCold);
 }
 
+/// Whether the handles have moved little: E_i^2 <= kGentleStrain^2 sum_j w_ij |p_i - p_j|^2 in every cell of the guess.
+bool Multiresolution::is_gentle() const {
+  const RestShape& shape = problem_.shape();
+  const Points& rest = shape.scaled_positions();
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    double size = 0;
+    for (std::int32_t k = shape.offsets()[i]; k < shape.offsets()[i + 1]; ++k)
+      size += shape.weights()[k] * (rest.row(i) - rest.row(shape.neighbours()[k])).squaredNorm();
+    if (!(problem_.objective.cells().squared_energies()[i] <= kGentleStrain * kGentleStrain * size))
+      return false;
+  }
+  return true;
+}
+
 double Multiresolution::first_tolerance() const {
+  if (is_eased_) return kGentleTolerance;
   if (is_search_) return kCoarseTolerance;
   if (level_.can_bend_like_fine()) return kFirstTolerance;
   return problem_.norm.lowest_p() < 2 ? kRoughCoarseTolerance : kCoarseTolerance;
@@ -61,7 +83,7 @@ std::optional<Points> Multiresolution::intermediate_state(bool is_last) {
   const int done = level_.solver().iterations();
   const auto begun = std::chrono::steady_clock::now();
   const bool is_due = done != looked_at_ && begun >= next_look_;
-  if ((done < kFirstLook && !is_eased_) || !(is_due || is_last)) return std::nullopt;
+  if ((done < kFirstLook && !goes_on_) || !(is_due || is_last)) return std::nullopt;
   looked_at_ = done;
   level_.solver().catch_up(is_last);
   Points found = prolonged();
@@ -75,12 +97,13 @@ std::optional<Points> Multiresolution::intermediate_state(bool is_last) {
 /// Lets the coarse level go on from its result with cells that bend like the fine ones. False if it does not.
 bool Multiresolution::begin_to_ease() {
   if (is_eased_ || !level_.can_bend_like_fine()) return false;
-  is_eased_ = true;
+  is_eased_ = goes_on_ = true;
   level_.bend_like_fine();
   SolveSettings settings;
   settings.initial = InitialGuess::kCurrent;
   settings.method = Method::kQuasiNewton;
-  settings.tolerance = std::max(problem_.tolerance, kEasedTolerance);
+  settings.tolerance =
+      level_.has_level_below() ? std::max(problem_.tolerance, kEasedTolerance) : kLowestTolerance;
   settings.effort = 0;
   return level_.solver().start(settings, problem_.stop).ok();
 }

@@ -124,7 +124,9 @@ bool Deformer::Impl::prepare_coarse() {
 
 Method Deformer::Impl::chosen_method(Method asked, bool is_warm) {
   if (asked == Method::kAuto) {
-    const std::int32_t large = (material.p.array() == 2).all() ? kLargeAtTwo : kLargeMesh;
+    const std::int32_t large = bending < 1                       ? CoarseLevel::kLeastEasedLevel
+                               : (material.p.array() == 2).all() ? kLargeAtTwo
+                                                                 : kLargeMesh;
     asked = is_warm || shape->vertex_count() < large ? Method::kQuasiNewton : Method::kMultiresolution;
   }
   if (asked != Method::kMultiresolution || (!is_warm && prepare_coarse())) return asked;

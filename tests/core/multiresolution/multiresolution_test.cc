@@ -293,5 +293,58 @@ TEST_P(EasedLevelTest, BeginsTheFineLevelWithinAnEighthOfItsEnd) {
 
 INSTANTIATE_TEST_SUITE_P(OfEveryP, EasedLevelTest, testing::Values(1.5, 2.0));
 
+/// A bumpy sheet, large enough for levels that bend like it, whose right edge turns by three degrees.
+class GentleMoveTest : public testing::Test {
+ protected:
+  static constexpr int kSide = 200;
+  const TriangleMesh mesh = grid(kSide, kSide, 2);
+  const std::shared_ptr<const RestShape> shape = rest_shape(mesh);
+  HandleSet bend() const {
+    HandleSet handles;
+    (void)handles.set("left", {slice(mesh, 0, 0, 0), Fixed{}});
+    (void)handles.set("right",
+                      {slice(mesh, 0, kSide, kSide),
+                       turn(Eigen::Vector3d::UnitY(), -3, {0.5 * kSide, 0, 0}, {0, 0, 0.2 * kSide / 30})});
+    return handles;
+  }
+  static SolveSummary solve(Deformer& deformer, Method method, int max_iterations = 0) {
+    SolveSettings settings;
+    settings.method = method;
+    settings.keep_trace = true;
+    settings.effort = 0;
+    if (max_iterations > 0) settings.max_iterations = max_iterations;
+    return deformer.solve(settings).value();
+  }
+};
+
+/// 233 iterations where the coarse levels bend like the fine one only afterwards.
+TEST_F(GentleMoveTest, LeavesFewIterationsToTheFineLevel) {
+  auto solver = deformer(shape, bend(), Material::uniform(6));
+  const SolveSummary summary = solve(*solver, Method::kMultiresolution);
+  const auto is_fine = [](const IterationRecord& record) { return record.stage > 0; };
+  const auto is_near = [&](const IterationRecord& record) {
+    return record.energy < std::pow(1.05, 6) * summary.energy;
+  };
+  const auto begun = std::find_if(summary.trace.begin(), summary.trace.end(), is_fine);
+  const auto near = std::find_if(begun, summary.trace.end(), is_near);
+  ASSERT_NE(near, summary.trace.end());
+  EXPECT_LE(near - begun, 60);
+}
+
+TEST_F(GentleMoveTest, EndsWhereQuasiNewtonEnds) {
+  auto alone = deformer(shape, bend(), Material::uniform(2));
+  auto nested = deformer(shape, bend(), Material::uniform(2));
+  const double expected = solve(*alone, Method::kQuasiNewton).energy;
+  EXPECT_LE(std::sqrt(solve(*nested, Method::kMultiresolution).energy / expected), 1.001);
+}
+
+TEST_F(GentleMoveTest, GivesTheSameBitsOnAnyNumberOfThreads) {
+  auto one = deformer(shape, bend(), Material::uniform(2), {.threads = 1});
+  auto two = deformer(shape, bend(), Material::uniform(2), {.threads = 2});
+  (void)solve(*one, Method::kMultiresolution, 600);
+  (void)solve(*two, Method::kMultiresolution, 600);
+  EXPECT_EQ(one->positions(), two->positions());
+}
+
 }  // namespace
 }  // namespace lpdeform
