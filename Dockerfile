@@ -1,25 +1,29 @@
 # The server and the command line in one image, Envoy and the viewer in another (--target web). The steps are those of the
-# README, by the same scripts.
+# README, by the same scripts. For another kind of machine (--platform linux/arm64, or linux/amd64 on arm64) they are compiled on this
+# one, and only the packages of the images are installed in emulation. Needs BuildKit, which Docker has had since 23, or Buildah.
 
-FROM debian:13 AS build
+FROM --platform=$BUILDPLATFORM debian:13 AS build
+ARG TARGETARCH
 WORKDIR /src
 COPY deploy deploy
-RUN deploy/install build run
+RUN deploy/install --for "$TARGETARCH" build run
 COPY . .
-RUN deploy/up --server-only --build-only
+RUN if [ "$(dpkg --print-architecture)" = "$TARGETARCH" ]; then deploy/up --server-only --build-only; else \
+    cmake --preset release --toolchain "deploy/$TARGETARCH.cmake" && cmake --build --preset release --target lpdeform-server lpdeform; fi
 
-FROM debian:13 AS build-web
+FROM --platform=$BUILDPLATFORM debian:13 AS build-web
+ARG TARGETARCH
 WORKDIR /src
 COPY deploy deploy
 COPY client/web/package.json client/web/package-lock.json client/web/
 COPY client/web/client/package.json client/web/client/
 COPY client/web/viewer/package.json client/web/viewer/
-RUN deploy/install web
+RUN deploy/install --for "$TARGETARCH" web
 COPY proto proto
 COPY client/web client/web
 RUN PATH=/src/build/web-tools/bin:$PATH npm run build --prefix client/web
 
-FROM debian:13 AS web
+FROM --platform=$TARGETPLATFORM debian:13 AS web
 COPY deploy/install deploy/packages.txt /opt/lpdeform/deploy/
 RUN /opt/lpdeform/deploy/install web-run && rm -rf /var/lib/apt/lists/* && \
     groupadd --gid 10001 lpdeform && useradd --uid 10001 --gid 10001 --no-create-home --shell /usr/sbin/nologin lpdeform
@@ -35,7 +39,7 @@ HEALTHCHECK --interval=15s --timeout=5s --start-period=10s \
 ENTRYPOINT ["deploy/web", "--health", "0.0.0.0:8081"]
 CMD ["--web", "0.0.0.0:8080", "--server", "lpdeform:50051"]
 
-FROM debian:13
+FROM --platform=$TARGETPLATFORM debian:13
 COPY deploy/install deploy/packages.txt /opt/lpdeform/deploy/
 RUN /opt/lpdeform/deploy/install run && rm -rf /var/lib/apt/lists/* && \
     groupadd --gid 10001 lpdeform && useradd --uid 10001 --gid 10001 --no-create-home --shell /usr/sbin/nologin lpdeform

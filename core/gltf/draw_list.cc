@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -64,14 +65,14 @@ class Reader {
     primitives_read_ += primitives->size();
     if (primitives_read_ > kMostPrimitives)
       refuse_unsupported("the scene", absl::StrCat("draws more than ", kMostPrimitives, " primitives"));
-    const std::size_t first_block = list_.blocks.size();
+    block_of_.clear();
     for (std::size_t k = 0; k < primitives->size(); ++k) {
       const std::string name = absl::StrCat("primitive ", k, " of ", part_name(root_, "meshes", mesh));
-      read_primitive((*primitives)[k], name, Block{node, mesh, {}, {k}, placed, 0, 0}, first_block);
+      read_primitive((*primitives)[k], name, Block{node, mesh, {}, {k}, placed, 0, 0});
     }
   }
 
-  void read_primitive(const Json& primitive, const std::string& part, Block block, std::size_t first_block) {
+  void read_primitive(const Json& primitive, const std::string& part, Block block) {
     const Json* const extensions = value_of(primitive, "extensions");
     if (extensions != nullptr && value_of(*extensions, "KHR_draco_mesh_compression") != nullptr)
       refuse_unsupported(part, "is compressed by KHR_draco_mesh_compression, which is not read");
@@ -90,7 +91,7 @@ class Reader {
     }
     block.attributes = {*position, attribute(root_, *attributes, "NORMAL", part),
                         attribute(root_, *attributes, "TANGENT", part)};
-    const std::size_t number = block.primitives[0], own = add_block(std::move(block), first_block, part);
+    const std::size_t number = block.primitives[0], own = add_block(std::move(block), part);
     const auto first_face = static_cast<Eigen::Index>(corners_.size() / 3);
     add_triangles(corner_list(primitive, static_cast<std::uint64_t>(list_.blocks[own].count), part), mode,
                   list_.blocks[own]);
@@ -103,11 +104,11 @@ class Reader {
     if (noticed_.insert({block.mesh, block.primitives[0]}).second) list_.notices.push_back(std::move(notice));
   }
 
-  std::size_t add_block(Block block, std::size_t first_block, const std::string& part) {
-    for (std::size_t k = first_block; k < list_.blocks.size(); ++k) {
-      if (list_.blocks[k].attributes != block.attributes) continue;
-      list_.blocks[k].primitives.push_back(block.primitives[0]);
-      return k;
+  std::size_t add_block(Block block, const std::string& part) {
+    const auto [found, is_new] = block_of_.try_emplace(block.attributes, list_.blocks.size());
+    if (!is_new) {
+      list_.blocks[found->second].primitives.push_back(block.primitives[0]);
+      return found->second;
     }
     block.first = vertex_count_;
     block.count = static_cast<Eigen::Index>(element_count(root_, block.attributes.position));
@@ -162,6 +163,7 @@ class Reader {
   DrawList list_;
   Eigen::Index vertex_count_ = 0;
   std::size_t corners_read_ = 0, primitives_read_ = 0;
+  std::map<Attributes, std::size_t> block_of_;             // of the node that is read
   std::set<std::pair<std::size_t, std::size_t>> noticed_;  // meshes and their primitives
   std::vector<std::int32_t> corners_;
 };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <compare>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -16,7 +17,7 @@ struct Attributes {
   std::size_t position = 0;
   std::optional<std::size_t> normal, tangent;
 
-  bool operator==(const Attributes&) const = default;
+  auto operator<=>(const Attributes&) const = default;
 };
 
 /// Vertices that one node draws: the elements of one set of accessors, which several primitives of its mesh may share.

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/gltf/accessors.h"
+#include "core/gltf/alone.h"
 
 namespace lpdeform::gltf {
 namespace {
@@ -13,18 +14,6 @@ namespace {
 /// Keys whose values are accessors, in glTF and its extensions.
 constexpr std::array<std::string_view, 5> kAccessorKeys{"indices", "inverseBindMatrices", "input", "output",
                                                         "accessor"};
-
-bool overlap(std::uint64_t begin, std::uint64_t end, std::uint64_t other_begin, std::uint64_t other_end) {
-  return begin < other_end && other_begin < end;
-}
-
-/// Whether elements of two accessors share bytes. Interleaved ones have one stride and different places within it.
-bool share_bytes(const Layout& a, const Layout& b) {
-  if (a.buffer != b.buffer || !overlap(a.begin, a.end(), b.begin, b.end())) return false;
-  if (a.stride != b.stride) return true;
-  const std::uint64_t gap = (b.begin + a.stride - a.begin % a.stride) % a.stride;
-  return gap < a.size || gap + b.size > a.stride;
-}
 
 }  // namespace
 
@@ -91,8 +80,13 @@ void Places::find_views() {
     const Json& view = item(root, "bufferViews", k);
     const std::string part = part_name(root, "bufferViews", k);
     const std::uint64_t begin = whole(view, "byteOffset", 0, part);
-    views_.push_back({needed_index(root, view, "buffer", "buffers", part), begin,
-                      begin + whole(view, "byteLength", 0, part)});
+    Bounds& bounds = bounds_of_views_[needed_index(root, view, "buffer", "buffers", part)];
+    bounds.begins.push_back(begin);
+    bounds.ends.push_back(begin + whole(view, "byteLength", 0, part));
+  }
+  for (auto& [buffer, bounds] : bounds_of_views_) {
+    std::ranges::sort(bounds.begins);
+    std::ranges::sort(bounds.ends);
   }
   for (std::size_t k = 0; k < count_of(root, "accessors"); ++k) {
     const Json* const view = value_of(root["accessors"][k], "bufferView");
@@ -101,19 +95,32 @@ void Places::find_views() {
   }
 }
 
-bool Places::has_bytes_alone(std::size_t accessor) const {
+std::ptrdiff_t Places::views_within(const Layout& layout) const {
+  const auto& [begins, ends] = bounds_of_views_.at(layout.buffer);
+  const auto begun = std::ranges::lower_bound(begins, layout.end()) - begins.begin();
+  const auto ended = std::ranges::upper_bound(ends, layout.begin) - ends.begin();
+  return begun - ended;
+}
+
+const std::set<std::size_t>& Places::alone_in(std::size_t view) {
+  const auto [found, is_new] = alone_in_view_.try_emplace(view);
+  if (!is_new) return found->second;
+  const std::vector<std::size_t>& accessors = accessors_of_view_.at(view);
+  std::vector<Layout> layouts;
+  for (const std::size_t accessor : accessors) layouts.push_back(layout_of(document_, accessor));
+  const std::vector<bool> are_alone = alone(layouts, share_bytes);
+  for (std::size_t k = 0; k < accessors.size(); ++k) {
+    if (are_alone[k]) found->second.insert(accessors[k]);
+  }
+  return found->second;
+}
+
+bool Places::has_bytes_alone(std::size_t accessor) {
   const Json& object = document_.root["accessors"][accessor];
   if (object["componentType"] != kFloat || value_of(object, "sparse") != nullptr) return false;
   const std::size_t own_view = object["bufferView"].get<std::size_t>();
-  const Layout own = layout_of(document_, accessor);
-  for (std::size_t k = 0; k < views_.size(); ++k) {
-    const auto& [buffer, begin, end] = views_[k];
-    const bool is_there = buffer == own.buffer && overlap(own.begin, own.end(), begin, end);
-    if (is_there && (k != own_view || other_views_.contains(k))) return false;
-  }
-  return std::ranges::none_of(accessors_of_view_.at(own_view), [&](std::size_t other) {
-    return other != accessor && share_bytes(own, layout_of(document_, other));
-  });
+  return !other_views_.contains(own_view) && views_within(layout_of(document_, accessor)) <= 1 &&
+         alone_in(own_view).contains(accessor);
 }
 
 bool Places::take(std::size_t accessor) {

@@ -6,6 +6,7 @@
 #include <set>
 #include <vector>
 
+#include "core/gltf/accessors.h"
 #include "core/gltf/draw_list.h"
 
 namespace lpdeform::gltf {
@@ -29,16 +30,19 @@ class Places {
   void find_uses_within(const Json& value);
   void add_use(const Json& value);
   void find_views();
-  bool has_bytes_alone(std::size_t accessor) const;
+  std::ptrdiff_t views_within(const Layout& layout) const;
+  const std::set<std::size_t>& alone_in(std::size_t view);
+  bool has_bytes_alone(std::size_t accessor);
 
   const Document& document_;
   std::set<std::size_t> meshes_elsewhere_, used_elsewhere_, taken_;
-  struct View {
-    std::size_t buffer = 0;
-    std::uint64_t begin = 0, end = 0;
+  struct Bounds {
+    std::vector<std::uint64_t> begins, ends;  // each sorted
   };
-  std::vector<View> views_;
+  std::map<std::size_t, Bounds> bounds_of_views_;  // by buffer
   std::map<std::size_t, std::vector<std::size_t>> accessors_of_view_;
+  std::map<std::size_t, std::set<std::size_t>>
+      alone_in_view_;                  // accessors that share no byte; made when asked for
   std::set<std::size_t> other_views_;  // views that something else than an accessor's "bufferView" names
 };
 

@@ -74,7 +74,9 @@ class Rewriter {
         positions_(positions),
         weld_(weld_of(rest_, weld)),
         places_(document, list),
-        out_(document) {}
+        out_(document) {
+    for (const Block& block : list_.blocks) first_node_of_mesh_.try_emplace(block.mesh, block.node);
+  }
 
   Document write(bool adds_normals) {
     const auto has = [&](auto attribute) {
@@ -218,9 +220,8 @@ class Rewriter {
   std::size_t own_mesh(const Block& block) {
     const auto [found, is_new] = mesh_of_node_.try_emplace(block.node, block.mesh);
     if (!is_new) return found->second;
-    const auto is_of_mesh = [&](const Block& other) { return other.mesh == block.mesh; };
-    const Block& first = *std::ranges::find_if(list_.blocks, is_of_mesh);
-    if (first.node == block.node && !places_.is_mesh_elsewhere(block.mesh)) return found->second;
+    if (first_node_of_mesh_.at(block.mesh) == block.node && !places_.is_mesh_elsewhere(block.mesh))
+      return found->second;
     out_.root["meshes"].push_back(document_.root["meshes"][block.mesh]);
     found->second = out_.root["meshes"].size() - 1;
     out_.root["nodes"][block.node]["mesh"] = found->second;
@@ -235,7 +236,7 @@ class Rewriter {
   Places places_;
   Document out_;
   Points normals_, tangents_;
-  std::map<std::size_t, std::size_t> mesh_of_node_;
+  std::map<std::size_t, std::size_t> mesh_of_node_, first_node_of_mesh_;
 };
 
 }  // namespace

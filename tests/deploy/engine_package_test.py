@@ -30,6 +30,15 @@ class WithLibraries(unittest.TestCase):
             (cls.work / "engine" / platform / "out").mkdir(parents=True)
             (cls.work / "engine" / platform / "out" / name).write_text(platform)
 
+    def expect_no_link_leads_outside(self, files):
+        """Of pages of a package: {place: text}."""
+        pages = {place: text for place, text in files.items() if place.endswith(".md")}
+        self.assertIn("README.md", pages)
+        for place, text in pages.items():
+            for link in re.findall(r"\]\(([^)\s]+)\)", text):
+                if not re.match(r"https?://|#", link):
+                    self.assertIn(str(pathlib.PurePosixPath(place).parent / link.split("#")[0]), files, place)
+
     def pack(self, kind, name, libraries="engine"):
         out = self.work / name
         made = subprocess.run([PACKAGE, kind, out, "--libraries", self.work / libraries], capture_output=True, text=True, check=False)
@@ -55,6 +64,9 @@ class Unity(WithLibraries):
         self.assertEqual(manifest["version"], VERSION)
         for place in ("README.md", "CHANGELOG.md", "LICENSE.md"):
             self.assertIn(place, self.files)
+
+    def test_its_pages_need_nothing_else(self):
+        self.expect_no_link_leads_outside(self.files)
 
     def test_each_sample_is_there(self):
         samples = json.loads(self.files["package.json"])["samples"]
@@ -174,6 +186,10 @@ class Unreal(WithLibraries):
             sources = "".join(file.read_text() for file in rules.parent.glob("Private/*.cpp"))
             self.assertRegex(sources, rf"IMPLEMENT_MODULE\(\w+, {module['Name']}\)")
 
+    def test_its_pages_need_nothing_else(self):
+        self.expect_no_link_leads_outside({str(file.relative_to(self.plugin)): file.read_text(errors="replace")
+                                           for file in self.plugin.rglob("*.*") if file.is_file()})
+
     def test_the_rules_find_all_files_on_each_platform(self):
         for platform in json.loads((self.plugin / "lpdeform.uplugin").read_text())["Modules"][0]["PlatformAllowList"]:
             code, lines = self.rules(platform)
@@ -219,6 +235,9 @@ class NuGet(WithLibraries):
         self.assertEqual(metadata.findtext("n:license", namespaces=space), "Apache-2.0")
         self.assertIn(metadata.findtext("n:readme", namespaces=space), self.files)
         self.assertIn(b'Target="/Lpdeform.nuspec"', self.files["_rels/.rels"])
+
+    def test_its_pages_need_nothing_else(self):
+        self.expect_no_link_leads_outside({name: content.decode(errors="replace") for name, content in self.files.items()})
 
     def test_each_kind_of_file_has_its_content_type(self):
         types = {entry.get("Extension") for entry in ElementTree.fromstring(self.files["[Content_Types].xml"])}
