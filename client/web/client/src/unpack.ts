@@ -58,6 +58,8 @@ export type UnpackAnswer = { id: number; unpacked: Unpacked } | { id: number; fa
  */
 export class Unpacker {
   #worker: Worker | undefined;
+  /** Whether the worker has answered; until then it may turn out that it cannot be loaded. */
+  #isProven = false;
   #lastId = 0;
   readonly #waiting = new Map<
     number,
@@ -74,15 +76,17 @@ export class Unpacker {
     }
   }
 
-  /** Rejects with a LpdeformError (FRAME_PARTS) if a block cannot be read. */
+  /** The bytes of `packed` may be gone afterwards. Rejects with a LpdeformError (FRAME_PARTS) if a block cannot be read. */
   unpack(packed: Packed): Promise<Unpacked> {
     if (!this.#worker) return unpackInPage(packed);
     const id = ++this.#lastId;
-    this.#worker.postMessage({ id, packed } satisfies UnpackRequest);
+    const bytes = packed.parts.flatMap(({ vertices, normals }) => [vertices.buffer, normals.buffer] as ArrayBuffer[]);
+    this.#worker.postMessage({ id, packed } satisfies UnpackRequest, this.#isProven ? bytes : []);
     return new Promise((done, failed) => this.#waiting.set(id, { packed, done, failed }));
   }
 
   #take(answer: UnpackAnswer): void {
+    this.#isProven = true;
     const waiting = this.#waiting.get(answer.id);
     this.#waiting.delete(answer.id);
     if ("unpacked" in answer) waiting?.done(answer.unpacked);

@@ -1,5 +1,6 @@
 // How long the viewer keeps the page's main thread busy without a break, at 100,000 vertices and more: npm run blocks.
-// SECONDS (default 8) of each drag; FILES: the folder of another build of the page. Measures, does not judge.
+// SECONDS (default 8) of each drag; FILES: the folder of another build of the page; PROFILE=1: says what the longest tasks did.
+// Measures, does not judge.
 import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -8,12 +9,13 @@ import { Service } from "../../../client/test/support/service.js";
 import { percentile } from "../../src/model/statistics.js";
 import { launch, User } from "../real/user.js";
 import { ringObj, ringVertex } from "../support/ring.js";
-import { longestByMark, type Task, Trace } from "./trace.js";
+import { tasksByMark, type Task, Trace } from "./trace.js";
 
 const seconds = Number(process.env["SECONDS"] ?? 8);
 const [around, across] = [460, 218]; // 100,280 vertices
 const [largeAround, largeAcross] = [620, 280]; // 173,600 vertices
-const blocks = ["what", "steps", "median", "p95", "longest", "computed: median", "p95", "longest"].map(String);
+const blocks = ["what", "steps", "computed: median", "p95", "longest", "by the clock: median", "p95", "longest"].map(String);
+const isProfiled = process.env["PROFILE"] !== undefined;
 const table: string[][] = [blocks];
 const notes: string[] = [];
 // The processor draws here, but in a process of its own, as a graphics card would: the page does not wait for its pictures.
@@ -32,7 +34,8 @@ afterAll(async () => {
   const lines = table.map((row) => row.map((cell, k) => (k ? cell.padStart(widths[k]!) : cell.padEnd(widths[k]!))).join("  "));
   console.log(
     [
-      "The longest task of the main thread in each step, in ms: by the clock, and what the thread computed in it.",
+      "The longest task of the main thread in each step, in ms: by what the thread computed in it, and by the clock, which goes on while",
+      "the thread waits for the GPU's process, where the processor draws here, and while other programs have the processor.",
       ...lines,
       "",
       ...notes,
@@ -40,10 +43,19 @@ afterAll(async () => {
   );
 });
 
-function note(what: string, tasks: readonly Task[]): void {
+/** `steps`: the tasks of each. */
+function note(what: string, steps: readonly (readonly Task[])[]): void {
+  const longest = (key: "wall" | "cpu") => steps.map((tasks) => Math.max(...tasks.map((task) => task[key])));
   const cells = (numbers: number[]) => [0.5, 0.95, 1].map((share) => percentile(numbers, share).toFixed(1));
-  const [walls, cpus] = [tasks.map(({ wall }) => wall), tasks.map(({ cpu }) => cpu)];
-  table.push([what, String(tasks.length), ...cells(walls), ...cells(cpus)]);
+  table.push([what, String(steps.length), ...cells(longest("cpu")), ...cells(longest("wall"))]);
+}
+
+function sayLongest(what: string, tasks: readonly Task[], trace: Trace): void {
+  if (!isProfiled) return;
+  if (process.env["ALL"]) console.log([what + " all", ...trace.what({ begin: tasks[0]!.begin, end: tasks.at(-1)!.end, wall: 0, cpu: 0 }, 60)].join("\n"));
+  for (const task of [...tasks].sort((a, b) => b.cpu - a.cpu).slice(0, 5)) {
+    console.log([`${what}: ${task.wall.toFixed(1)} ms, computed ${task.cpu.toFixed(1)}`, ...trace.what(task)].join("\n"));
+  }
 }
 
 /** By its path: a file that a test sends to the page keeps the page busy. */
@@ -86,7 +98,7 @@ it(
     await user.settled();
     await user.page.evaluate(watchDrag);
     const at = await user.vertexOnPage(ringVertex(around, across, 0.88, 0.2));
-    const trace = await Trace.start(user.browser);
+    const trace = await Trace.start(user.browser, isProfiled);
     await user.page.mouse.move(at.x, at.y);
     await user.page.mouse.down();
     await stir(user, at);
@@ -94,7 +106,8 @@ it(
     const watched = (await user.page.evaluate("window.__drag")) as { gaps: number[]; pictures: number; seconds: number };
     await user.page.mouse.up();
     await user.close();
-    note("drag: intake of a frame", longestByMark(tasks, marks, "before"));
+    note("drag: intake of a frame", tasksByMark(tasks, marks, "before"));
+    sayLongest("drag", tasks, trace);
     const gaps = [0.5, 0.95].map((share) => percentile(watched.gaps, share).toFixed(1)).join(" and ");
     const rate = (count: number) => (count / watched.seconds).toFixed(1);
     notes.push(
@@ -144,12 +157,13 @@ it(
       await user.settled();
       const at = await user.vertexOnPage(ringVertex(around, across, 0.8, 0.2));
       await user.page.mouse.move(at.x, at.y);
-      const trace = await Trace.start(user.browser);
+      const trace = await Trace.start(user.browser, isProfiled);
       await user.page.mouse.down();
       await stir(user, at);
       const { tasks, marks } = await trace.stop("brush-step");
       await user.page.mouse.up();
-      note(`${tool}: a step of a stroke`, longestByMark(tasks, marks, "after"));
+      note(`${tool}: a step of a stroke`, tasksByMark(tasks, marks, "after"));
+      sayLongest(tool, tasks, trace);
     }
     await user.close();
   },
@@ -163,7 +177,7 @@ it.each([
   "opening an OBJ file",
   async (one, other) => {
     const text = ringObj(one, other);
-    const longest: Task[] = [];
+    const openings: Task[][] = [];
     const waits: number[] = [];
     for (let time = 0; time < 3; ++time) {
       const user = await User.open(`${service.url}/?shape=sheet&detail=coarse`, { args });
@@ -171,7 +185,7 @@ it.each([
       await user.page.evaluate(() => {
         document.querySelector("#app")!.addEventListener("click", () => performance.mark("opening"), { capture: true });
       });
-      const trace = await Trace.start(user.browser);
+      const trace = await Trace.start(user.browser, isProfiled);
       const begin = performance.now();
       await openFile(user, text);
       await user.until(`window.__lpdeform.app.mesh.name === "ring.obj"`);
@@ -179,11 +193,12 @@ it.each([
       await user.until(`window.__lpdeform.status() === "live"`);
       await new Promise((again) => setTimeout(again, 1500)); // what the page keeps for later
       const { tasks } = await trace.stop("opening");
-      longest.push(tasks.reduce((most, task) => (task.wall > most.wall ? task : most)));
+      openings.push(tasks);
+      sayLongest("opening", tasks, trace);
       await user.close();
     }
     const name = `opening ${(one * other).toLocaleString("en")} vertices`;
-    note(name, longest);
+    note(name, openings);
     notes.push(`${name}: the mesh is there after ${percentile(waits, 0.5).toFixed(0)} ms.`);
   },
   300_000,
