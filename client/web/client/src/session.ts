@@ -72,11 +72,18 @@ export class Session implements AsyncIterable<Frame> {
 
   /** @internal openSession() and joinSession() make sessions. */
   constructor(rpc: Rpc, lease: Lease, frameOptions: FrameOptions, copy: Copy | undefined) {
-    this.#link = new Link(rpc, lease, frameOptionsToWire(frameOptions), copy, {
-      problem: (error) => [...this.#listeners.problem].forEach((listener) => tell(listener, error)),
-      connection: (state) => [...this.#listeners.connection].forEach((listener) => tell(listener, state)),
-      notice: (notice) => [...this.#listeners.notice].forEach((listener) => tell(listener, notice)),
-    });
+    this.#link = new Link(
+      rpc,
+      lease,
+      frameOptionsToWire(frameOptions),
+      copy,
+      {
+        problem: (error) => [...this.#listeners.problem].forEach((listener) => tell(listener, error)),
+        connection: (state) => [...this.#listeners.connection].forEach((listener) => tell(listener, state)),
+        notice: (notice) => [...this.#listeners.notice].forEach((listener) => tell(listener, notice)),
+      },
+      frameOptions.shading,
+    );
   }
 
   /** "sessions/<32 hexadecimal digits>"; it changes when the session has to be recreated. */

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
-import { adjacencyOf } from "../src/model/adjacency.js";
+import { adjacencyOf } from "lpdeform-client/mesh/adjacency";
 import { addHandle, changeHandle, type Document, emptyDocument, handleOf, removeHandle } from "../src/model/document.js";
-import { boundsOf, type Vector3 } from "../src/model/mesh.js";
+import { boundsOf, type Vector3 } from "lpdeform-client/mesh/mesh";
 import { Mirror } from "../src/model/mirror.js";
 import { apply, quaternionOf } from "../src/model/pose.js";
 import { partnerOf, symmetric } from "../src/model/symmetric.js";

@@ -1,17 +1,17 @@
 import type { MeshReport } from "lpdeform-client";
-import { type Adjacency, adjacencyOf } from "../model/adjacency.js";
+import { type Adjacency, adjacencyOf } from "lpdeform-client/mesh/adjacency";
 import { type AxisView, directionOf, viewAfter } from "../model/axis_views.js";
-import { derivedOf, shownOf } from "../model/derived.js";
+import { derivedOf, usualWelding, type Welding } from "lpdeform-client/mesh/derived";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
 import type { Shape } from "../model/blend.js";
 import { isAlike } from "../model/alike.js";
 import { History, type Steps } from "../model/history.js";
 import { keyPoseOf } from "../model/key_poses.js";
 import { kindOf } from "../model/hold_kinds.js";
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { Mirror, mirrorAxes, type Symmetry } from "../model/mirror.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
-import type { Seams } from "../model/seams.js";
+import type { Seams } from "lpdeform-client/mesh/seams";
 import { nothing } from "../model/pointed.js";
 import { subtract } from "../model/pose.js";
 import { gridStep } from "../model/snap.js";
@@ -19,9 +19,9 @@ import { State } from "../model/state.js";
 import { symmetric } from "../model/symmetric.js";
 import { firstView, type View } from "../model/view.js";
 import type { Look, Stage } from "../stage/stage.js";
-import { prepare } from "../io/opened.js";
+import { keepOnly, prepare } from "../io/opened.js";
 import { watchedMesh } from "../link/watched.js";
-import { Asides, type Kept } from "./asides.js";
+import { Asides, type Kept, weldingOf } from "./asides.js";
 import { type Facts, firstFacts, noMesh } from "./facts.js";
 import { Pace } from "./pace.js";
 import { Editing } from "./editing.js";
@@ -145,33 +145,42 @@ export class App implements Workbench {
     return this.view.now.isWelded ? this.#seams : undefined;
   }
 
-  /** Sets whether vertices along seams move as one. */
-  weld(isWelded: boolean): void {
-    if (!this.#seams) return;
-    this.view.set({ isWelded });
+  /** Sets which vertices along seams move as one. */
+  async weld(welding: Welding): Promise<void> {
+    const { mesh } = this;
+    await prepare(mesh, welding);
+    if (this.mesh !== mesh || derivedOf(mesh).welding !== welding) return; // another mesh, or another wish, has come since
+    this.#takeWelding();
     this.facts.set({ report: undefined, problem: undefined });
     this.#openPanes();
   }
 
+  #takeWelding(): void {
+    const { seams, welding } = derivedOf(this.mesh);
+    this.#seams = seams;
+    this.view.set({ isWelded: welding.isOn, weldTolerance: welding.tolerance });
+    this.facts.set({ seamVertices: seams?.copyCount ?? 0 });
+  }
+
   #openPanes(): void {
     const { mesh, seams } = this;
-    this.adjacency = shownOf(mesh, seams?.faces ?? mesh.faces).adjacency;
+    this.adjacency = derivedOf(mesh).shown.adjacency;
     for (const pane of this.panes) pane.open(mesh, this.document, this.view.now, seams, this.#watched);
     this.#needsMarks = true;
     this.#documentChanged(performance.now());
   }
 
   /** `isBroughtBack`: the user has worked on it before. */
-  open(mesh: Mesh, document: Document, isBroughtBack = false, isWelded = true): void {
+  open(mesh: Mesh, document: Document, isBroughtBack = false): void {
     this.endAll();
     if (this.isTouched) this.#asides.put(this.#present());
     this.#isBroughtBack = isBroughtBack;
     this.history.reset(document);
-    const { seams, edge, bounds } = derivedOf(mesh);
-    this.#seams = seams;
+    keepOnly(mesh);
+    const { edge, bounds } = derivedOf(mesh);
     this.edge = edge;
     this.diagonal = bounds.diagonal;
-    this.view.set({ selected: undefined, shape: "", pinned: undefined, isWelded });
+    this.view.set({ selected: undefined, shape: "", pinned: undefined });
     this.facts.set({
       mesh,
       report: undefined,
@@ -179,8 +188,8 @@ export class App implements Workbench {
       restoredFrom: undefined,
       pointedOut: nothing,
       setAside: this.#asides.names,
-      seamVertices: this.#seams?.copyCount ?? 0,
     });
+    this.#takeWelding();
     if (this.view.now.colourBy === "texture" && !this.isTextured) this.view.set({ colourBy: "distortion" });
     this.#openPanes();
     this.fit();
@@ -192,16 +201,16 @@ export class App implements Workbench {
    */
   async watch(session: string): Promise<void> {
     const mesh = await watchedMesh(session, (status) => this.facts.set({ status }));
-    await prepare(mesh);
+    await prepare(mesh, usualWelding);
     this.#watched = session;
     this.open(mesh, emptyDocument);
     this.view.set({ isYUp: derivedOf(mesh).isYUp });
   }
 
   #present(): Kept {
-    const { shape, detail, selected, isYUp, pinned, isWelded } = this.view.now;
+    const { shape, detail, selected, isYUp, pinned, isWelded, weldTolerance } = this.view.now;
     const { look } = this.panes[0]!.stage;
-    const view = { shape, detail, selected, isYUp, pinned, isWelded };
+    const view = { shape, detail, selected, isYUp, pinned, isWelded, weldTolerance };
     return { mesh: this.mesh, document: this.document, view, look, steps: this.history.stepsSoFar };
   }
 
@@ -227,18 +236,21 @@ export class App implements Workbench {
   }
 
   /** Restores work that was set aside, with its history. The present work is set aside instead. */
-  bringBack(id: number): void {
+  async bringBack(id: number): Promise<void> {
+    const wanted = this.#asides.find(id);
+    if (wanted) await prepare(wanted.mesh, weldingOf(wanted.view));
     const aside = this.#asides.take(id);
     if (!aside) return;
-    this.open(aside.mesh, aside.document, true, aside.view.isWelded);
+    this.open(aside.mesh, aside.document, true);
     this.#restoreSteps(aside.steps);
     this.view.set({ ...aside.view, tool: "move" });
     this.lookFrom(aside.look);
   }
 
-  /** Opens work that was kept over a reload. */
-  restore({ mesh, document, view, look, steps }: Kept): void {
-    this.open(mesh, document, true, view.isWelded);
+  /** Opens work that was kept over a reload, or in a file. */
+  async restore({ mesh, document, view, look, steps }: Kept): Promise<void> {
+    await prepare(mesh, weldingOf(view));
+    this.open(mesh, document, true);
     this.#restoreSteps(steps);
     this.view.set(view);
     this.lookFrom(look);

@@ -1,10 +1,10 @@
 import { LpdeformError } from "lpdeform-client";
 import { morphGlb } from "../io/gltf_morphs.js";
 import { shapesOf } from "../link/prepare.js";
-import { shownOf } from "../model/derived.js";
+import { derivedOf } from "lpdeform-client/mesh/derived";
 import type { Shape } from "../model/blend.js";
 import { type Moment, momentsOf, shapeAt } from "../model/film.js";
-import { DrawMesh } from "../stage/drawmesh.js";
+import { drawnAt } from "lpdeform-client/mesh/drawmesh";
 import type { App } from "./app.js";
 import { secondsEach } from "./player.js";
 
@@ -65,17 +65,13 @@ function sayChanged(app: App): undefined {
 
 /** The poses as a GLB with morph targets and an animation through them, shaded as on the page. */
 export async function posesAsGlb(app: App): Promise<Uint8Array<ArrayBuffer> | undefined> {
-  const { mesh, seams } = app;
+  const { mesh } = app;
   const made = await film(app);
   if (!made) return undefined;
   const { moments, shapes, seconds } = made;
-  const faces = seams?.faces ?? mesh.faces;
-  const draw = new DrawMesh({ positions: mesh.positions, faces }, shownOf(mesh, faces).drawn);
-  const stills = shapes.map(({ positions }, k) => {
-    draw.take(positions);
-    return { name: moments[k]!.name, positions: draw.positions.slice(), normals: draw.normals.slice() };
-  });
-  return morphGlb(mesh.name, draw.indices, stills, seconds / (stills.length - 1));
+  const { drawn } = derivedOf(mesh).shown;
+  const stills = shapes.map(({ positions }, k) => ({ name: moments[k]!.name, ...drawnAt(positions, drawn) }));
+  return morphGlb(mesh.name, drawn.indices, stills, seconds / (stills.length - 1));
 }
 
 /** The poses as a video of the first picture, as it looks. Undefined if this browser records none, or as film(). */

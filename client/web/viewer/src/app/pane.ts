@@ -1,4 +1,4 @@
-import type { Frame, LpdeformError, MeshReport } from "lpdeform-client";
+import type { EnergyStatistics, Frame, LpdeformError, MeshReport } from "lpdeform-client";
 import { Live, type LiveWatcher } from "../link/live.js";
 import { say, type Status } from "../link/status.js";
 import type { Shape } from "../model/blend.js";
@@ -6,16 +6,17 @@ import type { Side } from "../model/changes.js";
 import { Matrix4 } from "three";
 import { type Ahead, aheadOf } from "../model/ahead.js";
 import { type Document, pField } from "../model/document.js";
-import { boundsOf, centroid, type Mesh } from "../model/mesh.js";
+import { boundsOf, centroid, type Mesh } from "lpdeform-client/mesh/mesh";
 import { Progress } from "../model/progress.js";
-import { pullOf } from "../model/pull.js";
+import { pullOf } from "lpdeform-client/mesh/pull";
 import { cornersOf, type PointedOut } from "../model/pointed.js";
-import type { Seams } from "../model/seams.js";
-import { type EnergyStatistics, energyStatistics } from "../model/statistics.js";
+import type { Seams } from "lpdeform-client/mesh/seams";
+import { energyStatistics } from "lpdeform-client/mesh/statistics";
 import { selectionOf } from "../model/together.js";
 import type { View } from "../model/view.js";
-import { vertexNormals } from "../model/normals.js";
-import { type Intake, IntakeWorker } from "../stage/intake.js";
+import { vertexNormals } from "lpdeform-client/mesh/normals";
+import { type MeshWorker, workerOf } from "../io/opened.js";
+import type { Shaded } from "lpdeform-client";
 import { Overlay } from "../stage/overlay.js";
 import { Stage } from "../stage/stage.js";
 import { motionBetween } from "../stage/ahead.js";
@@ -54,9 +55,7 @@ export class Pane {
   frame: Frame | undefined;
   statistics = nothing;
   #isDirty = true;
-  #intakeWorker: IntakeWorker | undefined;
-  /** What is drawn of frames that are not drawn yet. */
-  #intakes = new WeakMap<Frame, Intake>();
+  #worker: MeshWorker | undefined;
   #onScreenNext: Frame | undefined;
   #pull: Pull | undefined;
   /** Shown in place of the frames. */
@@ -79,16 +78,13 @@ export class Pane {
   /** `watched`: somebody else's session of the mesh. */
   open(mesh: Mesh, document: Document, view: View, seams: Seams | undefined, watched?: string): void {
     this.live?.close();
-    this.#intakeWorker?.stop();
-    this.stage.open(mesh, seams?.faces);
-    this.#intakeWorker = IntakeWorker.start(this.stage.surface!.intakeMesh);
+    this.stage.open(mesh);
+    this.#worker = workerOf(mesh);
     this.frame = this.#onScreenNext = this.#pull = this.#preview = undefined;
     this.statistics = nothing;
     this.trail.reset();
     this.progress.reset();
-    const worker = this.#intakeWorker;
     const watcher: LiveWatcher = {
-      prepare: worker && ((frame) => this.#prepare(worker, frame)),
       frame: () => this.watcher.changed(),
       status: (status) => this.watcher.status(status),
       report: (report) => this.watcher.report(report),
@@ -96,14 +92,9 @@ export class Pane {
       notice: (text) => this.watcher.notice(text),
       better: () => this.watcher.better(),
     };
-    this.live = new Live(mesh, document, this.side, view.encoding, watcher, seams?.groups, watched);
+    this.live = new Live(mesh, document, this.side, view.encoding, watcher, seams?.groups, watched, this.#worker);
     this.watcher.better();
     this.#isDirty = true;
-  }
-
-  async #prepare(worker: IntakeWorker, frame: Frame): Promise<void> {
-    const intake = await worker.take(frame);
-    if (intake) this.#intakes.set(frame, intake);
   }
 
   get status(): Status {
@@ -125,7 +116,7 @@ export class Pane {
     }
     this.frame = this.#onScreenNext = frame;
     if (this.#endsWithFrame) this.#preview = undefined;
-    if (!this.#preview) this.#move(frame.positions, this.#intakes.get(frame));
+    if (!this.#preview) this.#move(frame.positions, frame.shaded);
     this.trail.add(frame.iteration, frame.energy ** (1 / this.live!.exponentOf(frame)));
     this.progress.add(frame);
     this.#isDirty = true;
@@ -154,10 +145,11 @@ export class Pane {
     this.#pull = pull;
     this.#showPull(surface, undefined);
     const { positions } = surface.mesh;
-    if (!this.#intakeWorker) return this.#showPull(surface, pullOf(positions, surface.adjacency, pulled, held));
-    void this.#intakeWorker.pull({ pulled, held }).then((shares) => {
+    if (!this.#worker) return this.#showPull(surface, pullOf(positions, surface.adjacency, pulled, held));
+    const show = (shares: Float32Array) => {
       if (this.#pull === pull && this.stage.surface === surface) this.#showPull(surface, shares);
-    });
+    };
+    this.#worker.pull({ pulled, held }).then(show, () => undefined); // the mesh was closed
   }
 
   #showPull(surface: Surface, shares: Float32Array | undefined): void {
@@ -182,11 +174,11 @@ export class Pane {
     if (this.stage.surface) this.#move(this.frame?.positions ?? this.stage.surface.mesh.positions);
   }
 
-  #move(positions: Float32Array, intake?: Intake): void {
-    this.stage.surface!.move(positions, intake);
+  #move(positions: Float32Array, shaded?: Shaded): void {
+    this.stage.surface!.move(positions, shaded);
     this.stage.marks.move(positions);
     this.stage.highlight.move(positions);
-    this.statistics = intake?.statistics ?? energyStatistics(this.distortion);
+    this.statistics = shaded?.statistics ?? energyStatistics(this.distortion);
     this.#isDirty = true;
   }
 
@@ -302,7 +294,6 @@ export class Pane {
   close(): void {
     this.over.abort();
     this.live?.close();
-    this.#intakeWorker?.stop();
     this.stage.dispose();
     this.element.remove();
   }

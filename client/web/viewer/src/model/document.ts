@@ -1,7 +1,7 @@
 import type { Hold, SurfacePoint } from "lpdeform-client";
 import { groupColours } from "./colours.js";
 import { fitPose } from "./fit.js";
-import { centroid, type Vector3 } from "./mesh.js";
+import { centroid, type Vector3 } from "lpdeform-client/mesh/mesh";
 import { about, add, type Pose } from "./pose.js";
 
 /** A group of vertices, or of points inside faces (from a file), that the user holds. */

@@ -1,5 +1,5 @@
-import { type Bounds, type Mesh, type Vector3 } from "./mesh.js";
-import type { Adjacency } from "./adjacency.js";
+import { type Bounds, type Mesh, type Vector3 } from "lpdeform-client/mesh/mesh";
+import type { Adjacency } from "lpdeform-client/mesh/adjacency";
 
 /** The plane across which work is done on both sides: by the axis that it cuts, through the middle of the mesh. */
 export type Symmetry = "none" | "x" | "y" | "z";

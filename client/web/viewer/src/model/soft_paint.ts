@@ -1,4 +1,4 @@
-import type { Adjacency } from "./adjacency.js";
+import type { Adjacency } from "lpdeform-client/mesh/adjacency";
 import { type Document, withoutField } from "./document.js";
 
 export type PaintField = "p" | "stiffness";

@@ -1,7 +1,7 @@
 import * as three from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { derivedOf } from "../model/derived.js";
-import { boundsOf, type Mesh, type Vector3 } from "../model/mesh.js";
+import { derivedOf } from "lpdeform-client/mesh/derived";
+import { boundsOf, type Mesh, type Vector3 } from "lpdeform-client/mesh/mesh";
 import { Backdrop } from "./backdrop.js";
 import { Highlight } from "./highlight.js";
 import { LateGizmo } from "./late_gizmo.js";
@@ -129,9 +129,8 @@ export class Stage {
     this.lookFrom(look);
   }
 
-  /** `faces`: the faces to shade smoothly, if these are not the mesh's own. */
-  open(mesh: Mesh, faces?: Uint32Array): void {
-    const surface = new Surface(mesh, faces); // made before the old one is removed, because there may be no memory for it
+  open(mesh: Mesh): void {
+    const surface = new Surface(mesh); // made before the old one is removed, because there may be no memory for it
     this.surface?.group.removeFromParent();
     this.surface?.dispose();
     this.surface = surface;

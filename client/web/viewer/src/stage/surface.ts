@@ -1,13 +1,15 @@
 import * as three from "three";
-import type { Adjacency } from "../model/adjacency.js";
-import { derivedOf, shownOf } from "../model/derived.js";
-import { blockBoxes, type FaceBlocks } from "../model/face_blocks.js";
-import type { Mesh } from "../model/mesh.js";
-import { Pairs } from "../model/pairs.js";
+import type { Adjacency } from "lpdeform-client/mesh/adjacency";
+import { type Derived, derivedOf } from "lpdeform-client/mesh/derived";
+import type { DrawnAt } from "lpdeform-client";
+import { drawInto, spread } from "lpdeform-client/mesh/drawmesh";
+import type { Drawn } from "lpdeform-client/mesh/drawn";
+import { blockBoxes, type FaceBlocks } from "lpdeform-client/mesh/face_blocks";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
+import { Pairs } from "lpdeform-client/mesh/pairs";
 import { type Hit, raycast } from "../model/raycast.js";
 import type { ColourBy, View } from "../model/view.js";
-import { DrawMesh } from "./drawmesh.js";
-import type { Intake, IntakeMesh } from "./intake.js";
+import type { Shaded } from "lpdeform-client";
 import { isSoftware } from "./software.js";
 import { colourByPixel, paint, surfaceMaterial } from "./surface_material.js";
 import type { Textured } from "./textured.js";
@@ -27,8 +29,9 @@ export class Surface {
   readonly group = new three.Group();
   /** The positions of the mesh's vertices, as drawn. */
   positions: Float32Array;
-  readonly #faces: Uint32Array;
-  readonly #draw: DrawMesh;
+  readonly #derived: Derived;
+  readonly #drawn: Drawn;
+  #at: DrawnAt;
   /** The motion of a handle since the frame; each vertex goes along as far as pull() has said. */
   readonly ahead = { value: new three.Matrix4() };
   #pull: Float32Array | undefined;
@@ -38,7 +41,7 @@ export class Surface {
   readonly #geometry = new three.BufferGeometry();
   readonly #values: Float32Array;
   readonly #pulls: Float32Array;
-  #intake: Intake | undefined;
+  #shaded: Shaded | undefined;
   readonly #isPerVertex: boolean;
   readonly #material: three.ShaderMaterial;
   readonly #wire = new three.LineSegments(
@@ -49,21 +52,20 @@ export class Surface {
   readonly #plain: three.Mesh;
   #textured: Textured | undefined;
 
-  constructor(
-    readonly mesh: Mesh,
-    faces = mesh.faces,
-  ) {
-    this.#faces = faces;
+  constructor(readonly mesh: Mesh) {
     this.positions = mesh.positions;
-    this.#draw = new DrawMesh({ positions: mesh.positions, faces }, shownOf(mesh, faces).drawn);
-    this.#values = new Float32Array(this.#draw.source.length);
-    this.#pulls = new Float32Array(this.#draw.source.length);
+    this.#derived = derivedOf(mesh);
+    const { drawn, atRest } = this.#derived.shown;
+    this.#drawn = drawn;
+    this.#at = { positions: atRest.positions.slice(), normals: atRest.normals.slice() };
+    this.#values = new Float32Array(drawn.source.length);
+    this.#pulls = new Float32Array(drawn.source.length);
     this.#isPerVertex = isSoftware && mesh.positions.length > 3 * denseVertices;
-    this.#material = surfaceMaterial(this.#isPerVertex, this.#draw.isClosed, this.ahead);
+    this.#material = surfaceMaterial(this.#isPerVertex, drawn.isClosed, this.ahead);
     const geometry = this.#geometry;
-    geometry.setIndex(new three.BufferAttribute(this.#draw.indices, 1));
-    geometry.setAttribute("position", live(this.#draw.positions, 3));
-    geometry.setAttribute("normal", live(this.#draw.normals, 3));
+    geometry.setIndex(new three.BufferAttribute(drawn.indices, 1));
+    geometry.setAttribute("position", live(this.#at.positions, 3));
+    geometry.setAttribute("normal", live(this.#at.normals, 3));
     geometry.setAttribute("value", live(this.#values, 1));
     geometry.setAttribute("pull", live(this.#pulls, 1));
     this.#ghost = this.#makeGhost();
@@ -78,7 +80,7 @@ export class Surface {
   /** Where a ray first meets the surface. */
   hit(origin: readonly [number, number, number], direction: readonly [number, number, number]): Hit | undefined {
     const { positions, mesh } = this;
-    const { order } = derivedOf(mesh);
+    const { order } = this.#derived;
     this.#blocks ??= { order, boxes: blockBoxes(positions, mesh.faces, order) };
     return raycast(positions, mesh.faces, origin, direction, this.#blocks);
   }
@@ -87,12 +89,12 @@ export class Surface {
   get drawnOf(): Uint32Array {
     if (this.#drawnOf) return this.#drawnOf;
     const drawn = new Uint32Array(this.mesh.positions.length / 3).fill(0xffffffff);
-    this.#draw.source.forEach((vertex, k) => (drawn[vertex] = k));
+    this.#drawn.source.forEach((vertex, k) => (drawn[vertex] = k));
     return (this.#drawnOf = drawn);
   }
 
   get adjacency(): Adjacency {
-    return shownOf(this.mesh, this.#faces).adjacency;
+    return this.#derived.shown.adjacency;
   }
 
   /** Gives a geometry the vertices of this one. */
@@ -107,14 +109,14 @@ export class Surface {
       this.ahead.value.identity();
       return;
     }
-    this.#draw.spread(shares, this.#pulls);
+    spread(shares, this.#drawn, this.#pulls);
     this.#show("pull", this.#pulls);
     if (this.#isTextured) this.#textured!.pull(this.#pulls);
   }
 
   /** Makes what is shown if colours are by texture. */
   dress(make: (indices: Uint32Array, makeMaterial: () => three.ShaderMaterial) => Textured): void {
-    this.#textured = make(this.#draw.indices, () => surfaceMaterial(this.#isPerVertex, this.#draw.isClosed, this.ahead));
+    this.#textured = make(this.#drawn.indices, () => surfaceMaterial(this.#isPerVertex, this.#drawn.isClosed, this.ahead));
     this.#textured.object.visible = false;
     this.group.add(this.#textured.object);
   }
@@ -129,27 +131,17 @@ export class Surface {
     return at.clone().lerp(at.applyMatrix4(this.ahead.value), this.#pull?.[vertex] ?? 0);
   }
 
-  /** For an IntakeWorker. */
-  get intakeMesh(): IntakeMesh {
-    const { positions, faces } = this.mesh;
-    const { adjacency, drawn } = shownOf(this.mesh, this.#faces);
-    return { positions, faces, drawn, adjacency, order: derivedOf(this.mesh).order };
-  }
-
-  /** Positions of the mesh's vertices; the array is kept. `intake`: what is drawn of them, if that was found elsewhere. */
-  move(positions: Float32Array, intake?: Intake): void {
+  /** Positions of the mesh's vertices; the array is kept. `shaded`: what is drawn of them, if that was found elsewhere. */
+  move(positions: Float32Array, shaded?: Shaded): void {
     this.positions = positions;
-    this.#intake = intake;
-    this.#blocks = intake && { order: derivedOf(this.mesh).order, boxes: intake.boxes };
-    if (intake) {
-      this.#draw.positions = intake.positions;
-      this.#draw.normals = intake.normals;
-    } else {
-      this.#draw.take(positions);
-    }
-    this.#show("position", this.#draw.positions);
-    this.#show("normal", this.#draw.normals);
-    if (this.#isTextured) this.#textured!.move(this.#draw);
+    const isOfThese = shaded?.positions.length === this.#at.positions.length; // not if the mesh was welded otherwise
+    this.#shaded = isOfThese ? shaded : undefined;
+    this.#blocks = this.#shaded && { order: this.#derived.order, boxes: this.#shaded.boxes };
+    if (this.#shaded) this.#at = this.#shaded;
+    else drawInto(this.#at, positions, this.#drawn);
+    this.#show("position", this.#at.positions);
+    this.#show("normal", this.#at.normals);
+    if (this.#isTextured) this.#textured!.move(this.#at);
   }
 
   #show(name: "position" | "normal" | "value" | "pull", array: Float32Array): void {
@@ -159,10 +151,10 @@ export class Surface {
   }
 
   colour(by: ColourBy, values: Float32Array | undefined, { low, red, isLogarithmic }: Scale): void {
-    if (values && by === "distortion" && this.#intake) {
-      this.#show("value", this.#intake.distortion);
+    if (values && by === "distortion" && this.#shaded) {
+      this.#show("value", this.#shaded.distortion);
     } else if (values) {
-      this.#draw.spread(values, this.#values);
+      spread(values, this.#drawn, this.#values);
       this.#show("value", this.#values);
     }
     const uniforms = this.#material.uniforms;
@@ -180,7 +172,7 @@ export class Surface {
     this.#textured.object.visible = isOn;
     this.#plain.visible = !isOn;
     if (!isOn) return;
-    this.#textured.move(this.#draw);
+    this.#textured.move(this.#at);
     this.#textured.pull(this.#pulls);
   }
 
@@ -206,7 +198,7 @@ export class Surface {
   #findEdges(): void {
     const { geometry } = this.#wire;
     if (geometry.index) return;
-    const { indices, source } = this.#draw;
+    const { indices, source } = this.#drawn;
     const lines = new Uint32Array(2 * indices.length);
     const known = new Pairs(indices.length);
     for (let corner = 0; corner < indices.length; ++corner) {

@@ -1,7 +1,7 @@
 import type { Defect, MeshReport } from "lpdeform-client";
 import type { App } from "../app/app.js";
 import { elementsIn } from "../link/status.js";
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { cornersOf, nothing, type PointedOut, within } from "../model/pointed.js";
 import { el, setText, toggle } from "./dom.js";
 import { icon } from "./icons.js";
@@ -35,7 +35,7 @@ export function reportPanel(app: App): HTMLElement {
   const weld = toggle(
     "Weld seams",
     true,
-    (isWelded) => app.weld(isWelded),
+    (isOn) => void app.weld({ tolerance: app.view.now.weldTolerance, isOn }),
     "Vertices in one place on open borders move as one; saved files have them all",
   );
   const seamBox = el("div", { className: "seams", hidden: true }, seams, weld.element);

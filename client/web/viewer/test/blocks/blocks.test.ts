@@ -6,7 +6,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { afterAll, beforeAll, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
-import { percentile } from "../../src/model/statistics.js";
+import { percentile } from "lpdeform-client/mesh/statistics";
 import { launch, User } from "../real/user.js";
 import { ringObj, ringVertex } from "../support/ring.js";
 import { tasksByMark, type Task, Trace } from "./trace.js";
@@ -52,7 +52,10 @@ function note(what: string, steps: readonly (readonly Task[])[]): void {
 
 function sayLongest(what: string, tasks: readonly Task[], trace: Trace): void {
   if (!isProfiled) return;
-  if (process.env["ALL"]) console.log([what + " all", ...trace.what({ begin: tasks[0]!.begin, end: tasks.at(-1)!.end, wall: 0, cpu: 0 }, 60)].join("\n"));
+  if (process.env["ALL"])
+    console.log(
+      [what + " all", ...trace.what({ begin: tasks[0]!.begin, end: tasks.at(-1)!.end, wall: 0, cpu: 0 }, 60)].join("\n"),
+    );
   for (const task of [...tasks].sort((a, b) => b.cpu - a.cpu).slice(0, 5)) {
     console.log([`${what}: ${task.wall.toFixed(1)} ms, computed ${task.cpu.toFixed(1)}`, ...trace.what(task)].join("\n"));
   }

@@ -53,7 +53,13 @@ export class Trace {
         includedCategories: [
           "disabled-by-default-devtools.timeline",
           "blink.user_timing",
-          ...(isProfiled ? ["devtools.timeline", "v8", ...(process.env["PROFILE"] === "events" ? [] : ["disabled-by-default-v8.cpu_profiler"])] : []),
+          ...(isProfiled
+            ? [
+                "devtools.timeline",
+                "v8",
+                ...(process.env["PROFILE"] === "events" ? [] : ["disabled-by-default-v8.cpu_profiler"]),
+              ]
+            : []),
         ],
       },
     });
@@ -101,7 +107,8 @@ export class Trace {
         now += timeDeltas[k] ?? 0;
         if (!within(now) || names.get(node) === "(program)" || names.get(node) === "(idle)") return;
         const stack: string[] = [];
-        for (let at: number | undefined = node; at !== undefined && stack.length < 5; at = parents.get(at)) stack.push(names.get(at)!);
+        for (let at: number | undefined = node; at !== undefined && stack.length < 5; at = parents.get(at))
+          stack.push(names.get(at)!);
         const key = stack.join(" < ");
         own.set(key, (own.get(key) ?? 0) + (timeDeltas[k] ?? 0) / 1000);
       });

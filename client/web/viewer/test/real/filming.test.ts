@@ -1,6 +1,6 @@
 import { writeFileSync } from "node:fs";
 import { beforeAll, expect, it } from "vitest";
-import { readGltfDocument } from "../../src/io/gltf_document.js";
+import { readGltfDocument } from "lpdeform-client/mesh/gltf_document";
 import { faultsOf } from "../gltf_validator.js";
 import { columns, makeGlb, rows } from "../made_glb.js";
 import { bar, withUser } from "./opened.js";

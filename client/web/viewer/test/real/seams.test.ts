@@ -1,5 +1,6 @@
 import { beforeAll, expect, it } from "vitest";
-import { readOff, writeOff } from "../../src/io/off.js";
+import { readOff } from "lpdeform-client/mesh/off";
+import { writeOff } from "../../src/io/write_off.js";
 import { splitTube } from "../split_tube.js";
 import { withUser } from "./opened.js";
 import type { User } from "./user.js";

@@ -1,4 +1,4 @@
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh } from "./mesh.js";
 import { FileFault } from "./fault.js";
 import { readGltf } from "./gltf.js";
 import { readObj } from "./obj.js";
@@ -7,7 +7,7 @@ import { readPly } from "./ply.js";
 import { readStl } from "./stl.js";
 
 /** Reads a mesh file by the ending of its name. `beside`: what was opened with it, by name. Throws a FileFault. */
-export function readMesh(name: string, bytes: Uint8Array, beside?: ReadonlyMap<string, Uint8Array>): Mesh {
+export function parseMesh(name: string, bytes: Uint8Array, beside?: ReadonlyMap<string, Uint8Array>): Mesh {
   switch (name.toLowerCase().split(".").at(-1)) {
     case "glb":
     case "gltf":
@@ -21,7 +21,9 @@ export function readMesh(name: string, bytes: Uint8Array, beside?: ReadonlyMap<s
     case "stl":
       return readStl(name, bytes);
     default:
-      throw new FileFault(`${name} is not a mesh that can be read: GLB, glTF, OFF, OBJ, PLY, STL, FBX, DAE and 3MF can.`);
+      throw new FileFault(
+        `${name} is not a mesh that can be read: GLB, glTF, OFF, OBJ, PLY, STL, FBX, DAE and 3MF can.`,
+      );
   }
 }
 
