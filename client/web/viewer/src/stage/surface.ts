@@ -63,6 +63,8 @@ export class Surface {
     this.#isPerVertex = isSoftware && mesh.positions.length > 3 * denseVertices;
     this.#material = surfaceMaterial(this.#isPerVertex, drawn.isClosed, this.ahead);
     const geometry = this.#geometry;
+    const { center, diagonal } = this.#derived.bounds;
+    geometry.boundingSphere = new three.Sphere(new three.Vector3(...center), diagonal / 2); // three.js sorts by it
     geometry.setIndex(new three.BufferAttribute(drawn.indices, 1));
     geometry.setAttribute("position", live(this.#at.positions, 3));
     geometry.setAttribute("normal", live(this.#at.normals, 3));
@@ -100,6 +102,7 @@ export class Surface {
   /** Gives a geometry the vertices of this one. */
   share(geometry: three.BufferGeometry): void {
     for (const name of ["position", "pull"]) geometry.setAttribute(name, this.#geometry.attributes[name]!);
+    geometry.boundingSphere = this.#geometry.boundingSphere;
   }
 
   /** `shares`: for each vertex of the mesh, how far it goes along with what is ahead; undefined: none does. */
@@ -211,12 +214,15 @@ export class Surface {
     }
     geometry.setIndex(new three.BufferAttribute(lines.slice(0, 2 * known.size), 1));
     geometry.setAttribute("position", this.#geometry.attributes["position"]!);
+    geometry.boundingSphere = this.#geometry.boundingSphere;
   }
 
   #makeGhost(): three.Mesh {
     const geometry = new three.BufferGeometry();
     geometry.setIndex(new three.BufferAttribute(this.mesh.faces, 1));
     geometry.setAttribute("position", new three.BufferAttribute(this.mesh.positions, 3));
+    const { center, diagonal } = this.#derived.bounds;
+    geometry.boundingSphere = new three.Sphere(new three.Vector3(...center), diagonal / 2);
     const material = new three.MeshBasicMaterial({
       transparent: true,
       opacity: 0.13,

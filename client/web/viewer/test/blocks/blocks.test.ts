@@ -7,8 +7,10 @@ import { join } from "node:path";
 import { afterAll, beforeAll, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
 import { percentile } from "lpdeform-client/mesh/statistics";
-import { launch, User } from "../real/user.js";
+import { chromium, type Browser } from "playwright-core";
+import { launch } from "../real/user.js";
 import { ringObj, ringVertex } from "../support/ring.js";
+import { BarePage } from "./bare_page.js";
 import { tasksByMark, type Task, Trace } from "./trace.js";
 
 const seconds = Number(process.env["SECONDS"] ?? 8);
@@ -61,33 +63,34 @@ function sayLongest(what: string, tasks: readonly Task[], trace: Trace): void {
   }
 }
 
-/** By its path: a file that a test sends to the page keeps the page busy. */
-async function openFile(user: User, text: string): Promise<void> {
+const bare = (browser: Browser) => BarePage.open(browser, `${service.url}/?shape=sheet&detail=coarse`);
+
+async function openFile(page: BarePage, text: string): Promise<void> {
   const path = join(folder, "ring.obj");
   writeFileSync(path, text);
-  const chooser = user.page.waitForEvent("filechooser");
-  await user.page.getByRole("button", { name: "Open" }).click();
-  await (await chooser).setFiles(path);
+  const place = `(({ x, y, width, height }) => ({ x: x + width / 2, y: y + height / 2 }))(
+    [...document.querySelectorAll("button")].find((one) => /^Open/.test(one.getAttribute("aria-label") ?? one.textContent.trim()))
+      .getBoundingClientRect())`;
+  await page.openFile(path, await page.evaluate(place));
 }
 
-async function opened(text: string): Promise<User> {
-  const user = await User.open(`${service.url}/?shape=sheet&detail=coarse`, { args });
-  await user.settled();
-  await openFile(user, text);
-  await user.until(`window.__lpdeform.app.mesh.name === "ring.obj" && window.__lpdeform.status() === "live"`);
-  return user;
+async function opened(text: string): Promise<{ browser: Browser; page: BarePage }> {
+  const browser = await chromium.launch({ ...launch, args });
+  const page = await bare(browser);
+  await page.settled();
+  await openFile(page, text);
+  await page.until(`window.__lpdeform.app.mesh.name === "ring.obj" && window.__lpdeform.status() === "live"`);
+  return { browser, page };
 }
 
-async function clickVertex(user: User, turn: number, roll: number): Promise<void> {
-  const { x, y } = await user.vertexOnPage(ringVertex(around, across, turn, roll));
-  await user.page.mouse.click(x, y);
-}
+const vertexOnPage = (page: BarePage, turn: number, roll: number) =>
+  page.ask<{ x: number; y: number }>(`vertexOnPage(${ringVertex(around, across, turn, roll)})`);
 
 /** Moves the pointer for some time, about sixty times a second. */
-async function stir(user: User, { x, y }: { x: number; y: number }): Promise<void> {
+async function stir(page: BarePage, { x, y }: { x: number; y: number }): Promise<void> {
   const begin = performance.now();
   for (let now = 0; now < 1000 * seconds; now = performance.now() - begin) {
-    await user.page.mouse.move(x + 60 * Math.sin(now / 500), y + 25 * (1 - Math.cos(now / 400)));
+    await page.mouse("mouseMoved", x + 60 * Math.sin(now / 500), y + 25 * (1 - Math.cos(now / 400)), true);
     await new Promise((again) => setTimeout(again, 16));
   }
 }
@@ -95,20 +98,19 @@ async function stir(user: User, { x, y }: { x: number; y: number }): Promise<voi
 it(
   "a drag",
   async () => {
-    const user = await opened(ringObj(around, across));
-    await clickVertex(user, 0.62, 0.2);
-    await clickVertex(user, 0.88, 0.2);
-    await user.settled();
-    await user.page.evaluate(watchDrag);
-    const at = await user.vertexOnPage(ringVertex(around, across, 0.88, 0.2));
-    const trace = await Trace.start(user.browser, isProfiled);
-    await user.page.mouse.move(at.x, at.y);
-    await user.page.mouse.down();
-    await stir(user, at);
+    const { browser, page } = await opened(ringObj(around, across));
+    for (const turn of [0.62, 0.88]) await page.click(await vertexOnPage(page, turn, 0.2));
+    await page.settled();
+    await page.evaluate(`(${watchDrag.toString()})()`);
+    const at = await vertexOnPage(page, 0.88, 0.2);
+    const trace = await Trace.start(browser, isProfiled);
+    await page.mouse("mouseMoved", at.x, at.y);
+    await page.mouse("mousePressed", at.x, at.y);
+    await stir(page, at);
     const { tasks, marks } = await trace.stop("frame-taken");
-    const watched = (await user.page.evaluate("window.__drag")) as { gaps: number[]; pictures: number; seconds: number };
-    await user.page.mouse.up();
-    await user.close();
+    const watched = await page.evaluate<{ gaps: number[]; pictures: number; seconds: number }>("window.__drag");
+    await page.mouse("mouseReleased", at.x, at.y);
+    await browser.close();
     note("drag: intake of a frame", tasksByMark(tasks, marks, "before"));
     sayLongest("drag", tasks, trace);
     const gaps = [0.5, 0.95].map((share) => percentile(watched.gaps, share).toFixed(1)).join(" and ");
@@ -150,25 +152,23 @@ function watchDrag(): void {
 it(
   "a brush's stroke",
   async () => {
-    const user = await opened(ringObj(around, across));
-    await clickVertex(user, 0.62, 0.2);
-    await user.page.evaluate(() => {
-      window.addEventListener("pointermove", () => performance.mark("brush-step"), { capture: true });
-    });
+    const { browser, page } = await opened(ringObj(around, across));
+    await page.click(await vertexOnPage(page, 0.62, 0.2));
+    await page.evaluate(`addEventListener("pointermove", () => performance.mark("brush-step"), { capture: true })`);
     for (const tool of ["brush", "paint"]) {
-      await user.ask(`app.view.set({ tool: "${tool}", radius: 0.05 })`);
-      await user.settled();
-      const at = await user.vertexOnPage(ringVertex(around, across, 0.8, 0.2));
-      await user.page.mouse.move(at.x, at.y);
-      const trace = await Trace.start(user.browser, isProfiled);
-      await user.page.mouse.down();
-      await stir(user, at);
+      await page.ask(`app.view.set({ tool: "${tool}", radius: 0.05 })`);
+      await page.settled();
+      const at = await vertexOnPage(page, 0.8, 0.2);
+      await page.mouse("mouseMoved", at.x, at.y);
+      const trace = await Trace.start(browser, isProfiled);
+      await page.mouse("mousePressed", at.x, at.y);
+      await stir(page, at);
       const { tasks, marks } = await trace.stop("brush-step");
-      await user.page.mouse.up();
+      await page.mouse("mouseReleased", at.x, at.y);
       note(`${tool}: a step of a stroke`, tasksByMark(tasks, marks, "after"));
       sayLongest(tool, tasks, trace);
     }
-    await user.close();
+    await browser.close();
   },
   (10 * seconds + 120) * 1000,
 );
@@ -177,28 +177,29 @@ it.each([
   [around, across],
   [largeAround, largeAcross],
 ])(
-  "opening an OBJ file",
+  "opening an OBJ file of %d by %d",
   async (one, other) => {
     const text = ringObj(one, other);
     const openings: Task[][] = [];
     const waits: number[] = [];
     for (let time = 0; time < 3; ++time) {
-      const user = await User.open(`${service.url}/?shape=sheet&detail=coarse`, { args });
-      await user.settled();
-      await user.page.evaluate(() => {
-        document.querySelector("#app")!.addEventListener("click", () => performance.mark("opening"), { capture: true });
-      });
-      const trace = await Trace.start(user.browser, isProfiled);
+      const browser = await chromium.launch({ ...launch, args });
+      const page = await bare(browser);
+      await page.settled();
+      await page.evaluate(
+        `document.querySelector("#app").addEventListener("click", () => performance.mark("opening"), { capture: true })`,
+      );
+      const trace = await Trace.start(browser, isProfiled);
       const begin = performance.now();
-      await openFile(user, text);
-      await user.until(`window.__lpdeform.app.mesh.name === "ring.obj"`);
+      await openFile(page, text);
+      await page.until(`window.__lpdeform.app.mesh.name === "ring.obj"`);
       waits.push(performance.now() - begin);
-      await user.until(`window.__lpdeform.status() === "live"`);
+      await page.until(`window.__lpdeform.status() === "live"`);
       await new Promise((again) => setTimeout(again, 1500)); // what the page keeps for later
       const { tasks } = await trace.stop("opening");
       openings.push(tasks);
       sayLongest("opening", tasks, trace);
-      await user.close();
+      await browser.close();
     }
     const name = `opening ${(one * other).toLocaleString("en")} vertices`;
     note(name, openings);
