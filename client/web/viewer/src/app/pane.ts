@@ -101,8 +101,13 @@ export class Pane {
     return this.live?.status ?? say("idle", "");
   }
 
+  /** Undefined at rest, before the first frame. */
+  get #distortion(): Float32Array | undefined {
+    return (this.#preview ?? this.frame)?.distortion;
+  }
+
   get distortion(): Float32Array {
-    return (this.#preview ?? this.frame)?.distortion ?? new Float32Array((this.stage.surface?.mesh.positions.length ?? 0) / 3);
+    return this.#distortion ?? new Float32Array((this.stage.surface?.mesh.positions.length ?? 0) / 3);
   }
 
   /** Takes the newest frame if there is one. Returns true if the surface has changed. */
@@ -187,7 +192,8 @@ export class Pane {
     if (!surface) return;
     if (view.colourBy === "texture") void this.#dress(surface);
     const p = this.side === "first" ? document.p : document.secondP;
-    const [values, scale] = coloured(document, view, p, this.distortion, red);
+    const count = surface.mesh.positions.length / 3;
+    const [values, scale] = coloured(document, view, p, this.#distortion, red, count);
     surface.colour(view.colourBy, values, scale);
     surface.show(view);
     this.stage.darken(view.isDark);
@@ -303,13 +309,13 @@ function coloured(
   document: Document,
   view: View,
   p: number,
-  distortion: Float32Array,
+  distortion: Float32Array | undefined,
   red: number,
-): [Float32Array | undefined, Scale] {
-  const count = distortion.length;
+  count: number,
+): [Float32Array | 0 | undefined, Scale] {
   switch (view.colourBy) {
     case "distortion":
-      return [distortion, { low: 0, red, isLogarithmic: false }];
+      return [distortion ?? 0, { low: 0, red, isLogarithmic: false }];
     case "p":
       return [pField(document, p) ?? new Float32Array(count).fill(p), { low: 1, red: 10, isLogarithmic: true }];
     case "stiffness":

@@ -201,6 +201,7 @@ export class Live {
   }
 
   async #run(): Promise<void> {
+    await new Promise((begin) => setTimeout(begin)); // the task that has opened the mesh has done enough
     while (!this.#over.signal.aborted) {
       const session = await this.#open();
       if (!session) return;

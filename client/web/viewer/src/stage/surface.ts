@@ -2,7 +2,7 @@ import * as three from "three";
 import type { Adjacency } from "lpdeform-client/mesh/adjacency";
 import { type Derived, derivedOf } from "lpdeform-client/mesh/derived";
 import type { DrawnAt } from "lpdeform-client";
-import { drawInto, spread } from "lpdeform-client/mesh/drawmesh";
+import { drawInto, drawnAt, spread } from "lpdeform-client/mesh/drawmesh";
 import type { Drawn } from "lpdeform-client/mesh/drawn";
 import { blockBoxes, type FaceBlocks } from "lpdeform-client/mesh/face_blocks";
 import type { Mesh } from "lpdeform-client/mesh/mesh";
@@ -32,6 +32,8 @@ export class Surface {
   readonly #derived: Derived;
   readonly #drawn: Drawn;
   #at: DrawnAt;
+  /** Whether nobody else has those arrays. */
+  #isOwn = false;
   /** The motion of a handle since the frame; each vertex goes along as far as pull() has said. */
   readonly ahead = { value: new three.Matrix4() };
   #pull: Float32Array | undefined;
@@ -57,7 +59,7 @@ export class Surface {
     this.#derived = derivedOf(mesh);
     const { drawn, atRest } = this.#derived.shown;
     this.#drawn = drawn;
-    this.#at = { positions: atRest.positions.slice(), normals: atRest.normals.slice() };
+    this.#at = atRest;
     this.#values = new Float32Array(drawn.source.length);
     this.#pulls = new Float32Array(drawn.source.length);
     this.#isPerVertex = isSoftware && mesh.positions.length > 3 * denseVertices;
@@ -141,7 +143,9 @@ export class Surface {
     this.#shaded = isOfThese ? shaded : undefined;
     this.#blocks = this.#shaded && { order: this.#derived.order, boxes: this.#shaded.boxes };
     if (this.#shaded) this.#at = this.#shaded;
-    else drawInto(this.#at, positions, this.#drawn);
+    else if (this.#isOwn) drawInto(this.#at, positions, this.#drawn);
+    else this.#at = drawnAt(positions, this.#drawn);
+    this.#isOwn = !this.#shaded;
     this.#show("position", this.#at.positions);
     this.#show("normal", this.#at.normals);
     if (this.#isTextured) this.#textured!.move(this.#at);
@@ -153,8 +157,12 @@ export class Surface {
     attribute.needsUpdate = true;
   }
 
-  colour(by: ColourBy, values: Float32Array | undefined, { low, red, isLogarithmic }: Scale): void {
-    if (values && by === "distortion" && this.#shaded) {
+  /** `values`: of the mesh's vertices; 0 if all are. */
+  colour(by: ColourBy, values: Float32Array | 0 | undefined, { low, red, isLogarithmic }: Scale): void {
+    if (values === 0) {
+      this.#values.fill(0);
+      this.#show("value", this.#values);
+    } else if (values && by === "distortion" && this.#shaded) {
       this.#show("value", this.#shaded.distortion);
     } else if (values) {
       spread(values, this.#drawn, this.#values);
@@ -164,7 +172,7 @@ export class Surface {
     uniforms["low"]!.value = low;
     uniforms["red"]!.value = red;
     uniforms["logarithmic"]!.value = isLogarithmic ? 1 : 0;
-    uniforms["colourful"]!.value = values ? 1 : 0;
+    uniforms["colourful"]!.value = values === undefined ? 0 : 1;
     colourByPixel(this.#material, by, this.#isPerVertex);
     this.#showTexture(by === "texture");
   }
