@@ -78,7 +78,6 @@ export class App implements Workbench {
         this.requestDraw();
       },
     );
-    new ResizeObserver(() => this.requestDraw()).observe(this.stages);
     for (const end of ["keyup", "blur"]) window.addEventListener(end, () => this.#keyUp());
   }
 

@@ -55,6 +55,8 @@ export class Pane {
   frame: Frame | undefined;
   statistics = nothing;
   #isDirty = true;
+  /** Of the element, in CSS pixels. */
+  #size: [number, number] = [0, 0];
   #worker: MeshWorker | undefined;
   #onScreenNext: Frame | undefined;
   #pull: Pull | undefined;
@@ -73,6 +75,12 @@ export class Pane {
       watcher.changed();
     });
     this.element.append(this.stage.canvas, this.overlay.element);
+    const resized = new ResizeObserver(() => {
+      this.#measure();
+      watcher.changed();
+    });
+    resized.observe(this.element);
+    this.over.signal.addEventListener("abort", () => resized.disconnect());
   }
 
   /** `watched`: somebody else's session of the mesh. */
@@ -241,6 +249,7 @@ export class Pane {
   fit(isYUp: boolean): void {
     const { surface } = this.stage;
     if (!surface) return;
+    this.#measure();
     this.#resize(true, 1);
     this.stage.fit(surface, isYUp);
   }
@@ -258,9 +267,15 @@ export class Pane {
     this.stage.lookAt(place, centroid(normals, vertices), [Math.max(6 * radius, 1.6 * diagonal), 3 * diagonal]);
   }
 
-  #resize(isMoving: boolean, quality: number): void {
+  /** The browser lays the page out for it. */
+  #measure(): void {
     const { clientWidth, clientHeight } = this.element;
-    if (this.stage.resize(clientWidth, clientHeight, isMoving, quality)) this.#isDirty = true;
+    this.#size = [clientWidth, clientHeight];
+  }
+
+  #resize(isMoving: boolean, quality: number): void {
+    const [width, height] = this.#size;
+    if (this.stage.resize(width, height, isMoving, quality)) this.#isDirty = true;
   }
 
   /** Draws what has changed, or everything finely for a picture at rest. Returns true if anything was drawn. */
@@ -275,8 +290,8 @@ export class Pane {
 
   /** If only the page's layout has changed. */
   #resizeToPage(): void {
-    const { clientWidth, clientHeight } = this.element;
-    if (clientWidth !== this.stage.width || clientHeight !== this.stage.height) this.#resize(true, 1);
+    const [width, height] = this.#size;
+    if (width !== this.stage.width || height !== this.stage.height) this.#resize(true, 1);
   }
 
   /**

@@ -124,7 +124,7 @@ it(
 
 /** Marks each frame that is taken, and measures in each picture how far the surface is from where the handle is. */
 function watchDrag(): void {
-  const { app, pointOnPage, vertexOnPage } = (window as any).__lpdeform;
+  const { app, pointOnPage } = (window as any).__lpdeform;
   const [pane] = app.panes;
   const take = pane.takeFrame.bind(pane);
   pane.takeFrame = () => {
@@ -143,9 +143,12 @@ function watchDrag(): void {
     ++drag.pictures;
     const [vertex] = vertices;
     const rest = app.mesh.positions.slice(3 * vertex, 3 * vertex + 3);
-    const wanted = pointOnPage([0, 1, 2].map((axis) => rest[axis] + pose.translation[axis]));
-    const drawn = vertexOnPage(vertex);
-    drag.gaps.push(Math.hypot(wanted.x - drawn.x, wanted.y - drawn.y));
+    const places = [[0, 1, 2].map((axis) => rest[axis] + pose.translation[axis]), pane.stage.surface.placeOf(vertex).toArray()];
+    // In a task of its own, because it is not the page's.
+    setTimeout(() => {
+      const [wanted, drawn] = places.map((place) => pointOnPage(place));
+      drag.gaps.push(Math.hypot(wanted.x - drawn.x, wanted.y - drawn.y));
+    });
   });
 }
 
