@@ -152,7 +152,7 @@ export class Link {
     return () => --this.#waitingForFrames;
   }
 
-  async close(): Promise<void> {
+  async close(keepalive = false): Promise<void> {
     if (this.isClosed) return;
     this.stop.abort();
     this.#pauses.end();
@@ -160,7 +160,7 @@ export class Link {
     this.#setConnection("closed");
     this.box.finish("closed");
     this.holds.wake();
-    if (this.copy) await this.rpc.call("deleteSession", { session: this.#lease.session });
+    if (this.copy) await this.rpc.call("deleteSession", { session: this.#lease.session }, undefined, keepalive);
   }
 
   async takeOver(): Promise<void> {

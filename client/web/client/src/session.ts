@@ -380,9 +380,13 @@ export class Session implements AsyncIterable<Frame> {
     return this.#link.takeOver();
   }
 
-  /** Ends the stream and every waiting call. Deletes the session on the server if openSession() created it. */
-  close(): Promise<void> {
-    return this.#link.close();
+  /**
+   * Ends the stream and every waiting call. Deletes the session on the server if openSession() created it. `keepalive`: also if the
+   * page is just being left, in a listener to "pagehide".
+   */
+  close(options: { keepalive?: boolean } = {}): Promise<void> {
+    checkCallOptions(options, "keepalive");
+    return this.#link.close(options.keepalive);
   }
 }
 

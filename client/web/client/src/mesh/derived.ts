@@ -1,4 +1,5 @@
-import { type Adjacency, adjacencyOf, meanEdge } from "./adjacency.js";
+import type { Weld } from "../types.js";
+import { type Adjacency, adjacencyOf, meanEdge, shortestEdge } from "./adjacency.js";
 import type { DrawnAt } from "../types.js";
 import { drawnAt } from "./drawmesh.js";
 import { type Drawn, drawnOf } from "./drawn.js";
@@ -9,7 +10,7 @@ import { guessYUp } from "./up.js";
 
 /** Which vertices count as one. */
 export interface Welding {
-  /** How far apart vertices on open borders may be in one place, as a share of the diagonal. */
+  /** How far apart vertices on open borders may be in one place, as a share of the diagonal: 0 to 0.001, as servers take it. */
   tolerance: number;
   /** Whether they count as one; if not, seams are found and nothing else. */
   isOn: boolean;
@@ -31,8 +32,9 @@ export interface Derived {
   welding: Welding;
   seams: Seams | undefined;
   bounds: Bounds;
-  /** The mean length of the edges. */
+  /** The mean length of the edges, and the least. */
   edge: number;
+  shortestEdge: number;
   isYUp: boolean;
   /** See faceOrder(). */
   order: Uint32Array;
@@ -41,6 +43,15 @@ export interface Derived {
 }
 
 const known = new WeakMap<Mesh, Derived>();
+
+/**
+ * For `weld` of openSession(); undefined if no two vertices are one. Servers take groups of what lies within the usual tolerance only;
+ * what lies farther apart they find themselves, everywhere on the mesh.
+ */
+export function weldOf({ seams, welding: { tolerance, isOn } }: Derived): Weld | undefined {
+  if (!isOn || !seams) return undefined;
+  return tolerance > usualWelding.tolerance ? { tolerance } : seams.groups;
+}
 
 /** What was found last, or is found now with the usual welding. */
 export function derivedOf(mesh: Mesh): Derived {
@@ -77,6 +88,7 @@ export function derive(mesh: Mesh, welding: Welding): Derived {
     seams,
     bounds: boundsOf(positions, faces),
     edge: meanEdge(own, positions),
+    shortestEdge: shortestEdge(own, positions),
     isYUp: guessYUp(mesh),
     order: faceOrder(positions, faces),
     shown,

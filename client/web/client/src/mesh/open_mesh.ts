@@ -1,6 +1,6 @@
 import { LpdeformError } from "../errors.js";
-import type { Packed, Shaded, Unpacked } from "../types.js";
-import { type Derived, know, usualWelding, type Welding } from "./derived.js";
+import type { Packed, Shaded, Unpacked, Weld } from "../types.js";
+import { type Derived, know, usualWelding, type Welding, weldOf } from "./derived.js";
 import { Desk, type Opening, type PullRequest, type Questions, type Source } from "./desk.js";
 import { FileFault } from "./fault.js";
 import type { Mesh } from "./mesh.js";
@@ -75,10 +75,9 @@ export class OpenMesh {
     return { vertices: exact ?? positions, faces };
   }
 
-  /** For `weld` of openSession(): for each vertex the first one in its place. Undefined if no two are one. */
-  get weld(): Uint32Array | undefined {
-    const { seams, welding } = this.#derived;
-    return welding.isOn ? seams?.groups : undefined;
+  /** For `weld` of openSession(). Undefined if no two vertices are one. */
+  get weld(): Weld | undefined {
+    return weldOf(this.#derived);
   }
 
   /** Finds again what is one. What is drawn changes with it. */

@@ -1,7 +1,7 @@
 import type { MeshReport } from "lpdeform-client";
 import { type Adjacency, adjacencyOf } from "lpdeform-client/mesh/adjacency";
 import { type AxisView, directionOf, viewAfter } from "../model/axis_views.js";
-import { derivedOf, usualWelding, type Welding } from "lpdeform-client/mesh/derived";
+import { derivedOf, isKnown, usualWelding, type Welding } from "lpdeform-client/mesh/derived";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
 import type { Shape } from "../model/blend.js";
 import { isAlike } from "../model/alike.js";
@@ -16,6 +16,7 @@ import { nothing } from "../model/pointed.js";
 import { subtract } from "../model/pose.js";
 import { gridStep } from "../model/snap.js";
 import { State } from "../model/state.js";
+import { short } from "../model/words.js";
 import { symmetric } from "../model/symmetric.js";
 import { firstView, type View } from "../model/view.js";
 import type { Look, Stage } from "../stage/stage.js";
@@ -78,6 +79,10 @@ export class App implements Workbench {
         this.requestDraw();
       },
     );
+    // Nobody waits for the end of an idle session. A page that the browser sets aside goes on when it comes back.
+    window.addEventListener("pagehide", ({ persisted }) => {
+      if (!persisted) for (const { live } of this.panes) live?.close(true);
+    });
     for (const end of ["keyup", "blur"]) window.addEventListener(end, () => this.#keyUp());
   }
 
@@ -146,9 +151,13 @@ export class App implements Workbench {
 
   /** Sets which vertices along seams move as one. */
   async weld(welding: Welding): Promise<void> {
-    const { mesh } = this;
+    const { mesh, diagonal } = this;
+    const share = derivedOf(mesh).shortestEdge / diagonal;
+    if (welding.tolerance > usualWelding.tolerance && welding.tolerance >= share) {
+      return this.notify(`The shortest edge has ${short(100 * share)} % of the size: its ends would be one vertex.`, true);
+    }
     await prepare(mesh, welding);
-    if (this.mesh !== mesh || derivedOf(mesh).welding !== welding) return; // another mesh, or another wish, has come since
+    if (this.mesh !== mesh || !isKnown(mesh, welding)) return; // another mesh, or another wish, has come since
     this.#takeWelding();
     this.facts.set({ report: undefined, problem: undefined });
     this.#openPanes();
@@ -162,9 +171,9 @@ export class App implements Workbench {
   }
 
   #openPanes(): void {
-    const { mesh, seams } = this;
+    const { mesh } = this;
     this.adjacency = derivedOf(mesh).shown.adjacency;
-    for (const pane of this.panes) pane.open(mesh, this.document, this.view.now, seams, this.#watched);
+    for (const pane of this.panes) pane.open(mesh, this.document, this.view.now, this.#watched);
     this.#needsMarks = true;
     this.#documentChanged(performance.now());
   }
@@ -304,9 +313,7 @@ export class App implements Workbench {
   setSymmetry(symmetry: Symmetry): void {
     this.view.set({ symmetry });
     if (symmetry === "none") return;
-    const hasPlaces = this.document.handles.some(({ targets }) => targets);
-    const but = hasPlaces ? " But handles whose vertices have places of their own are not mirrored." : "";
-    this.notify(`What is done on one side of the plane across ${symmetry} is done on the other.${but}`);
+    this.notify(`What is done on one side of the plane across ${symmetry} is done on the other.`);
   }
 
   endGesture(): void {
@@ -513,7 +520,7 @@ export class App implements Workbench {
   #addSecondPane(): boolean {
     try {
       const pane = this.#panes.add("second");
-      if (this.mesh !== noMesh) pane.open(this.mesh, this.document, this.view.now, this.seams, this.#watched);
+      if (this.mesh !== noMesh) pane.open(this.mesh, this.document, this.view.now, this.#watched);
       return true;
     } catch {
       this.notify("This browser draws no second picture. Close other pages that draw in three dimensions.", true);
@@ -539,7 +546,7 @@ export class App implements Workbench {
       this.#needsMarks = true;
     }
     if (view.encoding !== before.encoding && this.mesh !== noMesh)
-      for (const pane of this.panes) pane.open(this.mesh, this.document, view, this.seams, this.#watched);
+      for (const pane of this.panes) pane.open(this.mesh, this.document, view, this.#watched);
     if (view.isYUp !== before.isYUp) this.fit();
     this.#needsColours = this.#needsMarks = true;
     this.requestDraw();

@@ -1,4 +1,5 @@
 import type { EnergyStatistics, Frame, LpdeformError, MeshReport } from "lpdeform-client";
+import { derivedOf, weldOf } from "lpdeform-client/mesh/derived";
 import { Live, type LiveWatcher } from "../link/live.js";
 import { say, type Status } from "../link/status.js";
 import type { Shape } from "../model/blend.js";
@@ -10,7 +11,6 @@ import { boundsOf, centroid, type Mesh } from "lpdeform-client/mesh/mesh";
 import { Progress } from "../model/progress.js";
 import { pullOf } from "lpdeform-client/mesh/pull";
 import { cornersOf, type PointedOut } from "../model/pointed.js";
-import type { Seams } from "lpdeform-client/mesh/seams";
 import { energyStatistics } from "lpdeform-client/mesh/statistics";
 import { selectionOf } from "../model/together.js";
 import type { View } from "../model/view.js";
@@ -84,7 +84,7 @@ export class Pane {
   }
 
   /** `watched`: somebody else's session of the mesh. */
-  open(mesh: Mesh, document: Document, view: View, seams: Seams | undefined, watched?: string): void {
+  open(mesh: Mesh, document: Document, view: View, watched?: string): void {
     this.live?.close();
     this.stage.open(mesh);
     this.#worker = workerOf(mesh);
@@ -100,7 +100,7 @@ export class Pane {
       notice: (text) => this.watcher.notice(text),
       better: () => this.watcher.better(),
     };
-    this.live = new Live(mesh, document, this.side, view.encoding, watcher, seams?.groups, watched, this.#worker);
+    this.live = new Live(mesh, document, this.side, view.encoding, watcher, weldOf(derivedOf(mesh)), watched, this.#worker);
     this.watcher.better();
     this.#isDirty = true;
   }

@@ -59,7 +59,7 @@ const viewChecks: { readonly [K in keyof ProjectView]: (value: unknown) => boole
   isYUp: isBoolean,
   pinned: (value) => value === undefined || (typeof value === "number" && value > 0 && value < Infinity),
   isWelded: isBoolean,
-  weldTolerance: (value) => typeof value === "number" && value >= 0 && value <= 0.01,
+  weldTolerance: (value) => typeof value === "number" && value >= 0 && value <= 0.001,
   isSplit: isBoolean,
   colourBy: oneOf<ColourBy>(...colourings),
   wireframe: isBoolean,

@@ -11,6 +11,7 @@ import {
   type Session,
   type SolveResult,
   joinSession,
+  type Weld,
 } from "lpdeform-client";
 import { changes, exponent, newSession, type Side } from "../model/changes.js";
 import type { Document } from "../model/document.js";
@@ -72,8 +73,8 @@ export class Live {
     readonly side: Side,
     readonly encoding: Encoding,
     readonly watcher: LiveWatcher,
-    /** For each vertex a number, the same for vertices that count as one. */
-    readonly weld?: Uint32Array,
+    /** Which vertices count as one. */
+    readonly weld?: Weld,
     /** Somebody else's session, which is only shown. */
     readonly watched?: string,
     /** Finds what is drawn of frames; undefined if the page does. */
@@ -192,11 +193,12 @@ export class Live {
     this.watcher.better();
   }
 
-  close(): void {
+  /** `isPageLeft`: the server is told even if the page is there no longer. */
+  close(isPageLeft = false): void {
     this.#over.abort();
     this.#pulse.stop();
     this.#taken?.();
-    this.#session?.close().catch(() => undefined); // the session expires by itself if the server is away
+    this.#session?.close({ keepalive: isPageLeft }).catch(() => undefined); // the session expires by itself if the server is away
     this.#session = undefined;
   }
 

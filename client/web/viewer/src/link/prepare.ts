@@ -1,4 +1,4 @@
-import { openSession } from "lpdeform-client";
+import { openSession, type Weld } from "lpdeform-client";
 import type { Shape } from "../model/blend.js";
 import { changes, newSession } from "../model/changes.js";
 import type { Document } from "../model/document.js";
@@ -11,7 +11,7 @@ import type { Mesh } from "lpdeform-client/mesh/mesh";
 export async function* shapesOf(
   mesh: Mesh,
   documents: readonly Document[],
-  weld: Uint32Array | undefined,
+  weld: Weld | undefined,
   signal: AbortSignal,
 ): AsyncGenerator<Shape> {
   const { positions, exact, faces } = mesh;

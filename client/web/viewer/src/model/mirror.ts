@@ -65,6 +65,12 @@ export class Mirror {
     return other;
   }
 
+  /** Where a vertex is at rest. */
+  placeOf(vertex: number): Vector3 {
+    const [x, y, z] = this.#positions.subarray(3 * vertex, 3 * vertex + 3);
+    return [x!, y!, z!];
+  }
+
   /** The vector as seen in the mirror. */
   turned(vector: Vector3): Vector3 {
     const other = [...vector] as [number, number, number];

@@ -52,6 +52,18 @@ it("poses are exported as morph targets, solved in between, and validated", asyn
   expect(farthest.at(-1)).toBeGreaterThan(0.5);
 });
 
+it("Escape ends the recording of a video, and the picture shows the work again", async () => {
+  await user.page.getByRole("button", { name: "Save" }).click();
+  await user.page.getByRole("menuitem", { name: "Poses as video" }).click();
+  await user.page.locator(".notice", { hasText: "Recording the poses… Escape stops it." }).waitFor();
+  const downloads: string[] = [];
+  user.page.on("download", (one) => downloads.push(one.suggestedFilename()));
+  await user.page.keyboard.press("Escape");
+  await user.page.locator(".notice.bad", { hasText: "The poses were not exported. Escape was pressed." }).waitFor();
+  expect(downloads).toEqual([]);
+  await user.settled();
+});
+
 it("poses are recorded as a video of the picture, whose last picture is the last pose", async () => {
   const before = await user.ask<string | undefined>("app.view.now.selected");
   const video = await user.save("Poses as video");
