@@ -9,7 +9,7 @@ import type { Surface } from "./shaded.js";
 import type { StoredMesh } from "./stored.js";
 
 export interface ReadOptions {
-  /** Files that a `.gltf` names, and others, which are ignored. */
+  /** Files that a `.gltf` names, or the MTL and images of an OBJ (Mesh.materials). */
   beside?: readonly File[];
   /** Default: vertices on open borders are one within 1e-6 of the diagonal. */
   welding?: Welding;

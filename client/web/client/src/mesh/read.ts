@@ -15,7 +15,7 @@ export function parseMesh(name: string, bytes: Uint8Array, beside?: ReadonlyMap<
     case "off":
       return readOff(name, text(bytes));
     case "obj":
-      return { ...readObj(name, text(bytes)), obj: bytes };
+      return { ...readObj(name, text(bytes)), obj: bytes, ...materialsIn(beside) };
     case "ply":
       return readPly(name, bytes);
     case "stl":
@@ -25,6 +25,11 @@ export function parseMesh(name: string, bytes: Uint8Array, beside?: ReadonlyMap<
         `${name} is not a mesh that can be read: GLB, glTF, OFF, OBJ, PLY, STL, FBX, DAE and 3MF can.`,
       );
   }
+}
+
+function materialsIn(beside: ReadonlyMap<string, Uint8Array> = new Map()): Pick<Mesh, "materials"> {
+  const files = [...beside].map(([name, bytes]) => [name, new Blob([bytes as Uint8Array<ArrayBuffer>])] as const);
+  return files.some(([name]) => /\.mtl$/i.test(name)) ? { materials: Object.fromEntries(files) } : {};
 }
 
 function text(bytes: Uint8Array): string {

@@ -287,7 +287,8 @@ export class App implements Workbench {
 
   /** Whether the file of the mesh has materials that are shown. */
   get isTextured(): boolean {
-    return this.mesh.gltf !== undefined && this.mesh.beside?.includes("materials") === true;
+    const { gltf, materials, beside } = this.mesh;
+    return materials !== undefined || (gltf !== undefined && beside?.includes("materials") === true);
   }
 
   get mirror(): Mirror | undefined {

@@ -211,19 +211,21 @@ export class Pane {
 
   /** Once, when its texture is first wanted. */
   async #dress(surface: Surface): Promise<void> {
-    const { name, gltf } = surface.mesh;
-    if (this.#dressed === surface || !gltf) return;
+    const { name, gltf, obj, materials } = surface.mesh;
+    if (this.#dressed === surface || !(gltf || (obj && materials))) return;
     this.#dressed = surface;
     try {
-      const [{ readGltfTextures }, { closeAll, decoded, Textured }] = await Promise.all([
-        import("../io/gltf_textures.js"),
-        import("../stage/textured.js"),
-      ]);
-      const texturing = readGltfTextures(name, gltf);
+      const { closeAll, decoded, Textured } = await import("../stage/textured.js");
+      const texturing = gltf
+        ? (await import("../io/gltf_textures.js")).readGltfTextures(name, gltf)
+        : await (await import("../io/obj_textures.js")).readObjTextures(obj!, materials!);
       const images = await decoded(texturing.layers);
       if (this.stage.surface !== surface) return closeAll(images);
-      const missing = new Set(texturing.layers.map(({ image }, k) => (images[k] ? undefined : image)).filter(Boolean)).size;
-      if (missing > 0) this.watcher.notice(`${missing} textures of ${name} are images that this browser does not show.`);
+      const unknown = new Set(texturing.layers.map(({ image }, k) => (images[k] ? undefined : image)).filter(Boolean)).size;
+      if (unknown > 0) this.watcher.notice(`${unknown} textures of ${name} are images that this browser does not show.`);
+      const { missing = [] } = texturing;
+      if (missing.length > 0)
+        this.watcher.notice(`Open these images together with ${name} to see them: ${missing.join(", ")}.`);
       surface.dress((indices, makeMaterial) => new Textured({ indices }, texturing, images, makeMaterial));
       this.watcher.dressed();
     } catch (thrown) {

@@ -6,7 +6,7 @@ import { readObj } from "lpdeform-client/mesh/obj";
 import { isObject, type Sections } from "./sections.js";
 
 /** Where each part of a mesh goes in a project. One that is missing does not compile. */
-const parts: { readonly [K in keyof Required<Mesh>]: "head" | "array" | "source" } = {
+const parts: { readonly [K in keyof Required<Mesh>]: "head" | "array" | "source" | "left" } = {
   name: "head",
   positions: "array",
   exact: "array",
@@ -14,6 +14,7 @@ const parts: { readonly [K in keyof Required<Mesh>]: "head" | "array" | "source"
   corners: "array",
   beside: "head",
   obj: "source",
+  materials: "left",
   gltf: "source",
 };
 
