@@ -1,7 +1,7 @@
 // How long the viewer keeps the page's main thread busy without a break, at 100,000 vertices and more: npm run blocks.
 // SECONDS (default 8) of each drag; FILES: the folder of another build of the page; PROFILE=1: says what the longest tasks did.
 // Measures, does not judge.
-import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { afterAll, beforeAll, it } from "vitest";
@@ -10,7 +10,7 @@ import { percentile } from "lpdeform-client/mesh/statistics";
 import { chromium, type Browser } from "playwright-core";
 import { launch } from "../real/user.js";
 import { ringObj, ringVertex } from "../support/ring.js";
-import { BarePage } from "./bare_page.js";
+import { args, BarePage, stir } from "../real/bare_page.js";
 import { tasksByMark, type Task, Trace } from "./trace.js";
 
 const seconds = Number(process.env["SECONDS"] ?? 8);
@@ -20,8 +20,6 @@ const blocks = ["what", "steps", "computed: median", "p95", "longest", "by the c
 const isProfiled = process.env["PROFILE"] !== undefined;
 const table: string[][] = [blocks];
 const notes: string[] = [];
-// The processor draws here, but in a process of its own, as a graphics card would: the page does not wait for its pictures.
-const args = launch.args.filter((flag) => flag !== "--disable-gpu-compositing");
 const folder = mkdtempSync(join(tmpdir(), "lpdeform-blocks-"));
 let service: Service;
 
@@ -64,15 +62,7 @@ function sayLongest(what: string, tasks: readonly Task[], trace: Trace): void {
 }
 
 const bare = (browser: Browser) => BarePage.open(browser, `${service.url}/?shape=sheet&detail=coarse`);
-
-async function openFile(page: BarePage, text: string): Promise<void> {
-  const path = join(folder, "ring.obj");
-  writeFileSync(path, text);
-  const place = `(({ x, y, width, height }) => ({ x: x + width / 2, y: y + height / 2 }))(
-    [...document.querySelectorAll("button")].find((one) => /^Open/.test(one.getAttribute("aria-label") ?? one.textContent.trim()))
-      .getBoundingClientRect())`;
-  await page.openFile(path, await page.evaluate(place));
-}
+const openFile = (page: BarePage, text: string) => page.openText(join(folder, "ring.obj"), text);
 
 async function opened(text: string): Promise<{ browser: Browser; page: BarePage }> {
   const browser = await chromium.launch({ ...launch, args });
@@ -86,15 +76,6 @@ async function opened(text: string): Promise<{ browser: Browser; page: BarePage 
 const vertexOnPage = (page: BarePage, turn: number, roll: number) =>
   page.ask<{ x: number; y: number }>(`vertexOnPage(${ringVertex(around, across, turn, roll)})`);
 
-/** Moves the pointer for some time, about sixty times a second. */
-async function stir(page: BarePage, { x, y }: { x: number; y: number }): Promise<void> {
-  const begin = performance.now();
-  for (let now = 0; now < 1000 * seconds; now = performance.now() - begin) {
-    await page.mouse("mouseMoved", x + 60 * Math.sin(now / 500), y + 25 * (1 - Math.cos(now / 400)), true);
-    await new Promise((again) => setTimeout(again, 16));
-  }
-}
-
 it(
   "a drag",
   async () => {
@@ -106,7 +87,7 @@ it(
     const trace = await Trace.start(browser, isProfiled);
     await page.mouse("mouseMoved", at.x, at.y);
     await page.mouse("mousePressed", at.x, at.y);
-    await stir(page, at);
+    await stir(page, at, seconds);
     const { tasks, marks } = await trace.stop("frame-taken");
     const watched = await page.evaluate<{ gaps: number[]; pictures: number; seconds: number }>("window.__drag");
     await page.mouse("mouseReleased", at.x, at.y);
@@ -165,7 +146,7 @@ it(
       await page.mouse("mouseMoved", at.x, at.y);
       const trace = await Trace.start(browser, isProfiled);
       await page.mouse("mousePressed", at.x, at.y);
-      await stir(page, at);
+      await stir(page, at, seconds);
       const { tasks, marks } = await trace.stop("brush-step");
       await page.mouse("mouseReleased", at.x, at.y);
       note(`${tool}: a step of a stroke`, tasksByMark(tasks, marks, "after"));

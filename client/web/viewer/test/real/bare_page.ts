@@ -1,4 +1,23 @@
+import { writeFileSync } from "node:fs";
 import type { Browser, CDPSession } from "playwright-core";
+import { launch } from "./user.js";
+
+/** The processor draws here, but in a process of its own, as a graphics card would: the page does not wait for its pictures. */
+export const args = launch.args.filter((flag) => flag !== "--disable-gpu-compositing");
+
+/** Where the button is that opens files. */
+const openButton = `(({ x, y, width, height }) => ({ x: x + width / 2, y: y + height / 2 }))(
+  [...document.querySelectorAll("button")].find((one) => /^Open/.test(one.getAttribute("aria-label") ?? one.textContent.trim()))
+    .getBoundingClientRect())`;
+
+/** Moves the pressed pointer for some time, about sixty times a second. */
+export async function stir(page: BarePage, { x, y }: { x: number; y: number }, seconds: number): Promise<void> {
+  const begin = performance.now();
+  for (let now = 0; now < 1000 * seconds; now = performance.now() - begin) {
+    await page.mouse("mouseMoved", x + 60 * Math.sin(now / 500), y + 25 * (1 - Math.cos(now / 400)), true);
+    await new Promise((again) => setTimeout(again, 16));
+  }
+}
 
 interface Reply {
   id?: number;
@@ -65,17 +84,21 @@ export class BarePage {
     return this.evaluate(`window.__lpdeform.${what}`);
   }
 
-  async until(expression: string, pauseMs = 50): Promise<void> {
-    const end = performance.now() + 60_000;
+  async until(expression: string, pauseMs = 50, limitMs = 60_000): Promise<void> {
+    const end = performance.now() + limitMs;
     while (!(await this.evaluate(`Boolean(${expression})`))) {
       if (performance.now() > end) throw new Error(`It is not so: ${expression}`);
       await new Promise((again) => setTimeout(again, pauseMs));
     }
   }
 
-  async settled(): Promise<void> {
-    await this.until(`window.__lpdeform.status() === "live"`);
-    await this.until(`(({ isFinal, isSettling } = {}) => isFinal && !isSettling)(window.__lpdeform.frame(0))`);
+  async settled(pauseMs = 50): Promise<void> {
+    await this.until(`window.__lpdeform.status() === "live"`, pauseMs);
+    await this.until(
+      `(({ isFinal, isSettling } = {}) => isFinal && !isSettling)(window.__lpdeform.frame(0))`,
+      pauseMs,
+      300_000,
+    );
   }
 
   async mouse(type: "mouseMoved" | "mousePressed" | "mouseReleased", x: number, y: number, isDown = false): Promise<void> {
@@ -90,11 +113,12 @@ export class BarePage {
     await this.mouse("mouseReleased", x, y);
   }
 
-  /** By its path: a file that a test sends to the page keeps the page busy. `at`: of the button that opens files. */
-  async openFile(path: string, at: { x: number; y: number }): Promise<void> {
+  /** Written there first: a file that a test sends to the page keeps the page busy. */
+  async openText(path: string, text: string): Promise<void> {
+    writeFileSync(path, text);
     await this.#send("Page.setInterceptFileChooserDialog", { enabled: true });
     const chooser = new Promise<Record<string, unknown>>((opened) => this.#events.set("Page.fileChooserOpened", opened));
-    await this.click(at);
+    await this.click(await this.evaluate(openButton));
     const { backendNodeId } = await chooser;
     await this.#send("DOM.setFileInputFiles", { files: [path], backendNodeId });
   }
