@@ -306,6 +306,7 @@ export class Stage {
 
   draw(): void {
     this.gizmo.follow();
+    if (this.surface?.send()) this.changed();
     this.#renderer.render(this.#scene, this.camera);
     for (const surface of this.#replaced.splice(0)) surface.dispose();
   }
@@ -315,6 +316,7 @@ export class Stage {
     this.resize(this.width, this.height, false);
     const wasVisible = this.gizmo.object.visible;
     this.gizmo.object.visible = false;
+    while (this.surface?.send());
     this.draw();
     const copy = document.createElement("canvas");
     copy.width = this.canvas.width;

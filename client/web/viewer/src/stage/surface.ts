@@ -21,6 +21,9 @@ export interface Scale {
   isLogarithmic: boolean;
 }
 
+/** From this number of vertices on, the GPU is sent more than a picture has time for. */
+const largeVertices = 20_000;
+
 /** With this many vertices, lighting per vertex looks like lighting per pixel. */
 const denseVertices = 4000;
 
@@ -50,6 +53,9 @@ export class Surface {
     new three.BufferGeometry(),
     new three.LineBasicMaterial({ transparent: true, opacity: 0.35 }),
   );
+  /** Attributes that the GPU does not have yet, one for each picture to come, and what sends them. Empty for small meshes. */
+  readonly #unsent: string[] = [];
+  readonly #sender: three.Points;
   readonly #ghost: three.Mesh;
   readonly #plain: three.Mesh;
   #textured: Textured | undefined;
@@ -74,11 +80,32 @@ export class Surface {
     geometry.setAttribute("pull", live(this.#pulls, 1));
     this.#ghost = this.#makeGhost();
     this.#plain = new three.Mesh(geometry, this.#material);
-    for (const object of [this.#plain, this.#wire, this.#ghost]) {
+    this.#sender = new three.Points(new three.BufferGeometry(), this.#material);
+    this.#sender.geometry.setDrawRange(0, 0);
+    this.#sender.geometry.boundingSphere = geometry.boundingSphere;
+    if (mesh.positions.length > 3 * largeVertices) this.#unsent.push("position", "normal", "value", "pull");
+    this.#plain.visible = this.#unsent.length === 0;
+    for (const object of [this.#plain, this.#wire, this.#ghost, this.#sender]) {
       object.frustumCulled = false;
       this.group.add(object);
     }
     this.#wire.visible = this.#ghost.visible = false;
+  }
+
+  /**
+   * Called before each picture. The vertices of a large mesh go to the GPU in several pictures, before it is seen; true if more of
+   * them are needed.
+   */
+  send(): boolean {
+    const next = this.#unsent.shift();
+    if (next) this.#sender.geometry.setAttribute(next, this.#geometry.attributes[next]!);
+    this.#showPlain();
+    return this.#unsent.length > 0;
+  }
+
+  #showPlain(): void {
+    this.#plain.visible = this.#unsent.length === 0 && !this.#isTextured;
+    this.#sender.visible = this.#unsent.length > 0;
   }
 
   /** Where a ray first meets the surface. */
@@ -181,7 +208,7 @@ export class Surface {
   #showTexture(isOn: boolean): void {
     if (!this.#textured || isOn === this.#isTextured) return;
     this.#textured.object.visible = isOn;
-    this.#plain.visible = !isOn;
+    this.#showPlain();
     if (!isOn) return;
     this.#textured.move(this.#at);
     this.#textured.pull(this.#pulls);
@@ -198,6 +225,7 @@ export class Surface {
 
   dispose(): void {
     this.#geometry.dispose();
+    this.#sender.geometry.dispose();
     this.#wire.geometry.dispose();
     this.#ghost.geometry.dispose();
     for (const { material } of [this.#wire, this.#ghost]) (material as three.Material).dispose();

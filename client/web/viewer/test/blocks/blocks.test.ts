@@ -1,6 +1,6 @@
 // How long the viewer keeps the page's main thread busy without a break, at 100,000 vertices and more: npm run blocks.
-// SECONDS (default 8) of each drag; FILES: the folder of another build of the page; PROFILE=1: says what the longest tasks did.
-// Measures, does not judge.
+// SECONDS (default 8) of each drag; FILES: the folder of another build of the page; PROFILE: says what the longest tasks did, "all" with
+// functions, which makes them longer, or "events". Measures, does not judge.
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -17,7 +17,7 @@ const seconds = Number(process.env["SECONDS"] ?? 8);
 const [around, across] = [460, 218]; // 100,280 vertices
 const [largeAround, largeAcross] = [620, 280]; // 173,600 vertices
 const blocks = ["what", "steps", "computed: median", "p95", "longest", "by the clock: median", "p95", "longest"].map(String);
-const isProfiled = process.env["PROFILE"] !== undefined;
+const profile = process.env["PROFILE"] as "all" | "events" | undefined;
 const table: string[][] = [blocks];
 const notes: string[] = [];
 const folder = mkdtempSync(join(tmpdir(), "lpdeform-blocks-"));
@@ -51,11 +51,7 @@ function note(what: string, steps: readonly (readonly Task[])[]): void {
 }
 
 function sayLongest(what: string, tasks: readonly Task[], trace: Trace): void {
-  if (!isProfiled) return;
-  if (process.env["ALL"])
-    console.log(
-      [what + " all", ...trace.what({ begin: tasks[0]!.begin, end: tasks.at(-1)!.end, wall: 0, cpu: 0 }, 60)].join("\n"),
-    );
+  if (!profile) return;
   for (const task of [...tasks].sort((a, b) => b.cpu - a.cpu).slice(0, 5)) {
     console.log([`${what}: ${task.wall.toFixed(1)} ms, computed ${task.cpu.toFixed(1)}`, ...trace.what(task)].join("\n"));
   }
@@ -84,7 +80,7 @@ it(
     await page.settled();
     await page.evaluate(`(${watchDrag.toString()})()`);
     const at = await vertexOnPage(page, 0.88, 0.2);
-    const trace = await Trace.start(browser, isProfiled);
+    const trace = await Trace.start(browser, profile);
     await page.mouse("mouseMoved", at.x, at.y);
     await page.mouse("mousePressed", at.x, at.y);
     await stir(page, at, seconds);
@@ -144,7 +140,7 @@ it(
       await page.settled();
       const at = await vertexOnPage(page, 0.8, 0.2);
       await page.mouse("mouseMoved", at.x, at.y);
-      const trace = await Trace.start(browser, isProfiled);
+      const trace = await Trace.start(browser, profile);
       await page.mouse("mousePressed", at.x, at.y);
       await stir(page, at, seconds);
       const { tasks, marks } = await trace.stop("brush-step");
@@ -173,7 +169,7 @@ it.each([
       await page.evaluate(
         `document.querySelector("#app").addEventListener("click", () => performance.mark("opening"), { capture: true })`,
       );
-      const trace = await Trace.start(browser, isProfiled);
+      const trace = await Trace.start(browser, profile);
       const begin = performance.now();
       await openFile(page, text);
       await page.until(`window.__lpdeform.app.mesh.name === "ring.obj"`);

@@ -43,8 +43,8 @@ export class Trace {
     session.on("Tracing.dataCollected", ({ value }) => this.#events.push(...(value as unknown as TraceEvent[])));
   }
 
-  /** `isProfiled`: for what(), which costs the page some time. */
-  static async start(browser: Browser, isProfiled = false): Promise<Trace> {
+  /** `profile`: for what(): events, or functions too, which costs the page some time. */
+  static async start(browser: Browser, profile?: "events" | "all"): Promise<Trace> {
     const session = await browser.newBrowserCDPSession();
     const trace = new Trace(session);
     await session.send("Tracing.start", {
@@ -53,13 +53,8 @@ export class Trace {
         includedCategories: [
           "disabled-by-default-devtools.timeline",
           "blink.user_timing",
-          ...(isProfiled
-            ? [
-                "devtools.timeline",
-                "v8",
-                ...(process.env["PROFILE"] === "events" ? [] : ["disabled-by-default-v8.cpu_profiler"]),
-              ]
-            : []),
+          ...(profile ? ["devtools.timeline", "v8"] : []),
+          ...(profile === "all" ? ["disabled-by-default-v8.cpu_profiler"] : []),
         ],
       },
     });
@@ -83,42 +78,50 @@ export class Trace {
     return { tasks, marks: marked.map(({ ts }) => ts / 1000).sort((a, b) => a - b) };
   }
 
-  /** What the thread did in the task, the longest first, in milliseconds by the clock: events, and functions by their own time. */
-  what({ begin, end }: Task, most = 14): string[] {
+  /** What the thread did in the task, the longest first: events by what they computed, and functions by the clock, in milliseconds. */
+  what(task: Task): string[] {
     const { pid, tid } = this.#marked!;
-    const within = (at: number) => at >= 1000 * begin && at <= 1000 * end;
-    const events = this.#events
-      .filter((one) => one.pid === pid && one.tid === tid && one.name !== "RunTask" && within(one.ts) && (one.tdur ?? 0) > 300)
-      .map(({ name, tdur = 0 }) => [name, tdur / 1000] as const);
-    const own = new Map<string, number>();
-    const names = new Map<number, string>();
-    const parents = new Map<number, number>();
-    let now = 0;
+    const isIn = (one: TraceEvent) => one.pid === pid && one.tid === tid && one.name !== "RunTask" && isWithin(task, one.ts);
+    const events = this.#events.filter(isIn).map(({ name, tdur = 0 }) => [name, tdur / 1000] as const);
+    return [...events, ...this.#functions(task)]
+      .filter(([, time]) => time > 0.3)
+      .sort(([, a], [, b]) => b - a)
+      .slice(0, 14)
+      .map(([name, time]) => `${time.toFixed(1).padStart(7)}  ${name}`);
+  }
+
+  /** The time of each function, with those that have called it, if there is a profile. */
+  #functions(task: Task): Map<string, number> {
+    const { pid, tid } = this.#marked!;
     const profile = this.#events.find((one) => one.name === "Profile" && one.pid === pid && one.tid === tid)?.id;
+    const nodes = new Map<number, ProfileNode>();
+    const stackOf = (node: number | undefined) => {
+      const stack: string[] = [];
+      for (let at = node; at !== undefined && stack.length < 5; at = nodes.get(at)!.parent) {
+        stack.push(nodes.get(at)!.callFrame.functionName || "(anonymous)");
+      }
+      return stack.join(" < ");
+    };
+    const own = new Map<string, number>();
+    let now = 0;
     for (const { pid: process, id, args } of this.#events) {
       if (process !== pid || id === undefined || id !== profile) continue;
       const { startTime, cpuProfile, timeDeltas = [] } = args?.data ?? {};
-      if (startTime !== undefined) now = startTime;
-      for (const { id, parent, callFrame } of cpuProfile?.nodes ?? []) {
-        names.set(id, callFrame.functionName || "(anonymous)");
-        if (parent !== undefined) parents.set(id, parent);
-      }
+      now = startTime ?? now;
+      for (const node of cpuProfile?.nodes ?? []) nodes.set(node.id, node);
       cpuProfile?.samples?.forEach((node, k) => {
         now += timeDeltas[k] ?? 0;
-        if (!within(now) || names.get(node) === "(program)" || names.get(node) === "(idle)") return;
-        const stack: string[] = [];
-        for (let at: number | undefined = node; at !== undefined && stack.length < 5; at = parents.get(at))
-          stack.push(names.get(at)!);
-        const key = stack.join(" < ");
-        own.set(key, (own.get(key) ?? 0) + (timeDeltas[k] ?? 0) / 1000);
+        const stack = isWithin(task, now) ? stackOf(node) : "";
+        if (stack && !/^\((program|idle)\)/.test(stack)) own.set(stack, (own.get(stack) ?? 0) + (timeDeltas[k] ?? 0) / 1000);
       });
     }
-    return [...events, ...own]
-      .filter(([, time]) => time > 0.3)
-      .sort(([, a], [, b]) => b - a)
-      .slice(0, most)
-      .map(([name, time]) => `${time.toFixed(1).padStart(7)}  ${name}`);
+    return own;
   }
+}
+
+/** `at`: in microseconds. */
+function isWithin({ begin, end }: Task, at: number): boolean {
+  return at >= 1000 * begin && at <= 1000 * end;
 }
 
 /** The tasks of each mark but the first and the last: those from the mark on, or those up to it. */
