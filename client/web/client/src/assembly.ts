@@ -3,7 +3,7 @@ import { LpdeformError } from "./errors.js";
 import { WireFrame } from "./frame.js";
 import { Scalar } from "./gen/lpdeform/v1/data_pb.js";
 import { Encoding, type FrameHeader, type FramePart } from "./gen/lpdeform/v1/frame_pb.js";
-import type { Packed } from "./unpack.js";
+import type { Packed } from "./types.js";
 
 type Numbers = Float32Array | Float64Array | Uint16Array | Int16Array;
 

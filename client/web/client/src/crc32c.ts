@@ -1,4 +1,4 @@
-import { inTaskOfItsOwn } from "./task.js";
+import { inTaskOfItsOwn, stepBytes } from "./task.js";
 
 /** The remainders of each byte followed by 0 to 7 zero bytes, so that eight bytes are taken at once. */
 const tables = Array.from({ length: 8 }, () => new Uint32Array(256));
@@ -24,14 +24,11 @@ const [t0, t1, t2, t3, t4, t5, t6, t7] = tables as [
   Uint32Array,
 ];
 
-/** A page is busy for about a millisecond with so many bytes. */
-const stepBytes = 1 << 19;
-
 /** CRC-32C (Castagnoli) as an unsigned number. The page can do something else in between. */
 export async function crc32c(bytes: Uint8Array): Promise<number> {
   let rest = 0xffffffff;
   for (let begin = 0; begin < bytes.length; begin += stepBytes) {
-    if (begin > 0) await new Promise<void>(inTaskOfItsOwn);
+    if (bytes.length > stepBytes) await new Promise<void>(inTaskOfItsOwn);
     rest = taken(rest, bytes.subarray(begin, begin + stepBytes));
   }
   return (rest ^ 0xffffffff) >>> 0;

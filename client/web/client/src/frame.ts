@@ -1,8 +1,7 @@
 import { distortionOf, normalsOf, positionsOf } from "./decode.js";
 import { methodName, stopReasonFromWire } from "./fromwire.js";
 import type { FrameHeader } from "./gen/lpdeform/v1/frame_pb.js";
-import type { DoubleSurface, Frame, QuantizedSurface, StopReason } from "./types.js";
-import type { Packed, Unpacked } from "./unpack.js";
+import type { DoubleSurface, Frame, Packed, QuantizedSurface, Shaded, StopReason, Unpacked } from "./types.js";
 
 type Surface<Numbers> = Record<"positions" | "distortion" | "normals", Numbers>;
 
@@ -28,6 +27,7 @@ export class WireFrame implements Frame {
   /** Doubles only if FrameAssembly was told to expect them. */
   raw: Surface<Float32Array | Float64Array> = { positions: none, distortion: none, normals: none };
   quantized: QuantizedSurface | undefined;
+  shaded: Shaded | undefined;
   /** As it came, if it has to be unpacked before anybody sees it. */
   packed: Packed | undefined;
   readonly #decoded: Partial<Surface<Float32Array>> = {};
@@ -47,9 +47,10 @@ export class WireFrame implements Frame {
     this.method = methodName(header.method);
   }
 
-  take({ quantized, ...decoded }: Unpacked): void {
+  take({ quantized, shaded, ...decoded }: Unpacked & { shaded?: Shaded }): void {
     this.packed = undefined;
     this.quantized = quantized;
+    this.shaded = shaded;
     Object.assign(this.#decoded, decoded);
   }
 

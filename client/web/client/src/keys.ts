@@ -24,6 +24,7 @@ const frames: Keys<api.FrameOptions> = {
   maxFramesPerSecond: true,
   encoding: true,
   lowestEncoding: true,
+  shading: true,
 };
 const restore: Keys<api.RestoreOptions> = { ...connect, ...frames, signal: true };
 const join: Keys<api.JoinOptions> = { ...restore, role: true };

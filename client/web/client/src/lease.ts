@@ -41,7 +41,7 @@ export async function createSession(
   const normals = mesh.normals && packer.numbers(mesh.normals);
   const request = {
     requestId,
-    mesh: meshToWire(mesh, packer),
+    mesh: await meshToWire(mesh, packer),
     weights: weights[options.weights ?? "cotangent"],
     freeComponents: freeComponents[options.freeComponents ?? "error"],
     settings: settingsToWire(options.settings ?? {}, packer),

@@ -14,9 +14,9 @@ import { Notices } from "./notices.js";
 import { type Answer, answerOf, Backoff, RecoveryRules, writerReplaced } from "./recovery.js";
 import type { Rpc } from "./rpc.js";
 import { sendUpdate } from "./sendupdate.js";
-import type { BetterShape, Connection, Frame, Notice, Update } from "./types.js";
+import type { BetterShape, Connection, Frame, FrameShading, FrameUnpacker, Notice, Update } from "./types.js";
 import { newRequestId } from "./requestid.js";
-import { type Unpacker, unpackerFor } from "./unpack.js";
+import { unpackerFor } from "./unpack.js";
 import { isUndecided } from "./verdict.js";
 import { Pauses } from "./waiting.js";
 
@@ -41,8 +41,8 @@ export class Link {
   #lease: Lease;
   #lane: Lane | undefined;
   #assembly = new FrameAssembly(0);
-  /** Set if frames are unpacked before they are taken. */
-  #unpacker: Unpacker | undefined;
+  /** Set if frames are unpacked, or shaded, before they are taken. */
+  #unpacker: FrameUnpacker | undefined;
   #goAway: GoAway | undefined;
   /** Set while no stream is open: the server may continue from an older state. Updates wait until it says which. */
   #mayHaveGoneBack = false;
@@ -74,6 +74,7 @@ export class Link {
     readonly frameOptions: WireFrameOptions,
     readonly copy: Copy | undefined,
     readonly watcher: Watcher,
+    readonly shading?: FrameShading,
   ) {
     this.#lease = lease;
     this.ledger = new Ledger(copy?.isBare);
@@ -151,7 +152,7 @@ export class Link {
     return () => --this.#waitingForFrames;
   }
 
-  async close(): Promise<void> {
+  async close(keepalive = false): Promise<void> {
     if (this.isClosed) return;
     this.stop.abort();
     this.#pauses.end();
@@ -159,7 +160,7 @@ export class Link {
     this.#setConnection("closed");
     this.box.finish("closed");
     this.holds.wake();
-    if (this.copy) await this.rpc.call("deleteSession", { session: this.#lease.session });
+    if (this.copy) await this.rpc.call("deleteSession", { session: this.#lease.session }, undefined, keepalive);
   }
 
   async takeOver(): Promise<void> {
@@ -180,6 +181,12 @@ export class Link {
 
   // The stream.
 
+  /** Unpacks and shades the frame elsewhere; undefined if nothing is to be done. */
+  #prepare(frame: WireFrame): Promise<void> | undefined {
+    if (frame.packed) return this.#unpacker?.unpack(frame.packed).then((unpacked) => frame.take(unpacked));
+    return this.shading?.shade(frame).then((shaded) => void (frame.shaded = shaded));
+  }
+
   #subscribe(): void {
     this.#goAway = undefined;
     const { session } = this.#lease;
@@ -187,7 +194,7 @@ export class Link {
       asked: () => (this.#asked = this.ledger.newestAccepted),
       opened: (opened) => {
         checkVertexCount(opened.vertexCount, this.#lease.report.vertices);
-        this.#unpacker = unpackerFor(opened.vertexCount);
+        this.#unpacker = this.shading ?? unpackerFor(opened.vertexCount);
         const isDouble = this.frameOptions.scalar === Scalar.FLOAT64;
         this.#assembly = new FrameAssembly(opened.vertexCount, isDouble, this.#unpacker !== undefined);
         this.#clearNotices(); // they were about an earlier stream
@@ -201,10 +208,10 @@ export class Link {
         const frame = this.#assembly.add(part);
         if (!frame) return;
         const { streamId } = lane;
-        if (!frame.packed || !this.#unpacker) return this.#takeFrame(frame, lane, streamId);
-        void this.#unpacker.unpack(frame.packed).then(
-          (unpacked) => {
-            frame.take(unpacked);
+        const ready = this.#prepare(frame);
+        if (!ready) return this.#takeFrame(frame, lane, streamId);
+        void ready.then(
+          () => {
             if (this.#lane === lane && this.#lease.session === session) this.#takeFrame(frame, lane, streamId);
           },
           (error) => lane.misfit(error as LpdeformError),

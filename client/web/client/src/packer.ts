@@ -1,5 +1,6 @@
 import { create } from "@bufbuild/protobuf";
 import { LpdeformError } from "./errors.js";
+import { stepBytes } from "./task.js";
 import { type Buffer, BufferSchema, Scalar } from "./gen/lpdeform/v1/data_pb.js";
 
 export type Numbers = Float32Array | Float64Array | readonly number[];
@@ -17,6 +18,11 @@ export type Upload = (bytes: Uint8Array) => Promise<string>;
 /** Puts arrays into the buffers of one message. Call flush() before the message is sent. */
 export class Packer {
   #left = mostInlineBytes;
+  /** Whether the message takes a page some time to write and to send. */
+  get isLarge(): boolean {
+    return mostInlineBytes - this.#left > stepBytes / 8;
+  }
+
   readonly #large: { buffer: Buffer; bytes: Uint8Array }[] = [];
 
   pack(bytes: Uint8Array): Buffer {

@@ -34,6 +34,18 @@ function keepTogether(id: string): Interceptor {
   };
 }
 
+/** Marks a call, on its way to fetch(), that outlives the page. */
+const keepaliveHeader = "lpdeform-keepalive";
+
+function fetchBy(own: ConnectOptions["fetch"]): typeof globalThis.fetch {
+  return (input, init) => {
+    const headers = new Headers(init?.headers);
+    const keepalive = headers.has(keepaliveHeader);
+    headers.delete(keepaliveHeader);
+    return (own ?? globalThis.fetch)(input, keepalive ? { ...init, headers, keepalive } : init);
+  };
+}
+
 /** The calls of the service. Every error is thrown as an LpdeformError. */
 export class Rpc {
   readonly client: Client<typeof DeformService>;
@@ -66,7 +78,7 @@ export class Rpc {
     if (known) return known;
     const id = route || newRequestId();
     const interceptors = [keepTogether(id), ...(token ? [bearing(token)] : [])];
-    const transport = createGrpcWebTransport({ baseUrl, interceptors, ...(fetch && { fetch }) });
+    const transport = createGrpcWebTransport({ baseUrl, interceptors, fetch: fetchBy(fetch) });
     const rpc = new Rpc(transport, callTimeoutMs, reconnectForMs);
     rpc.#route = id;
     if (!fetch) rpc.#baseUrl = baseUrl;
@@ -88,16 +100,19 @@ export class Rpc {
     return route === this.#route ? this : (this.#another?.(route) ?? this);
   }
 
+  /** `keepalive`: the call goes on if the page is left. */
   async call<Name extends Unary>(
     name: Name,
     request: MessageInitShape<Methods[Name]["input"]>,
     signal?: AbortSignal,
+    keepalive = false,
   ): Promise<MessageShape<Methods[Name]["output"]>> {
     type Call = (request: unknown, options: CallOptions) => Promise<MessageShape<Methods[Name]["output"]>>;
     try {
       const answer = await (this.client[name] as unknown as Call)(request, {
         timeoutMs: this.callTimeoutMs,
         ...(signal && { signal }),
+        ...(keepalive && { headers: { [keepaliveHeader]: "yes" } }),
       });
       this.#wasAnswered = true;
       return answer;

@@ -2,6 +2,7 @@ import type { Lease } from "./lease.js";
 import type { NumberedUpdate } from "./ledger.js";
 import { Packer } from "./packer.js";
 import type { Rpc } from "./rpc.js";
+import { inTaskOfItsOwn } from "./task.js";
 import { updateToWire } from "./towire.js";
 import { Uploads } from "./upload.js";
 
@@ -16,6 +17,7 @@ export async function sendUpdate(
   const uploads = new Uploads(rpc, signal);
   const message = updateToWire(update.update, update.seq, packer);
   try {
+    if (packer.isLarge) await new Promise<void>(inTaskOfItsOwn); // not in the task of whoever makes the change
     await packer.flush((bytes) => uploads.add(bytes));
     const { result } = await rpc.call("updateHandles", { session, writerToken, update: message }, signal);
     return result?.kept ?? false;

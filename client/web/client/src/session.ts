@@ -72,11 +72,18 @@ export class Session implements AsyncIterable<Frame> {
 
   /** @internal openSession() and joinSession() make sessions. */
   constructor(rpc: Rpc, lease: Lease, frameOptions: FrameOptions, copy: Copy | undefined) {
-    this.#link = new Link(rpc, lease, frameOptionsToWire(frameOptions), copy, {
-      problem: (error) => [...this.#listeners.problem].forEach((listener) => tell(listener, error)),
-      connection: (state) => [...this.#listeners.connection].forEach((listener) => tell(listener, state)),
-      notice: (notice) => [...this.#listeners.notice].forEach((listener) => tell(listener, notice)),
-    });
+    this.#link = new Link(
+      rpc,
+      lease,
+      frameOptionsToWire(frameOptions),
+      copy,
+      {
+        problem: (error) => [...this.#listeners.problem].forEach((listener) => tell(listener, error)),
+        connection: (state) => [...this.#listeners.connection].forEach((listener) => tell(listener, state)),
+        notice: (notice) => [...this.#listeners.notice].forEach((listener) => tell(listener, notice)),
+      },
+      frameOptions.shading,
+    );
   }
 
   /** "sessions/<32 hexadecimal digits>"; it changes when the session has to be recreated. */
@@ -373,9 +380,13 @@ export class Session implements AsyncIterable<Frame> {
     return this.#link.takeOver();
   }
 
-  /** Ends the stream and every waiting call. Deletes the session on the server if openSession() created it. */
-  close(): Promise<void> {
-    return this.#link.close();
+  /**
+   * Ends the stream and every waiting call. Deletes the session on the server if openSession() created it. `keepalive`: also if the
+   * page is just being left, in a listener to "pagehide".
+   */
+  close(options: { keepalive?: boolean } = {}): Promise<void> {
+    checkCallOptions(options, "keepalive");
+    return this.#link.close(options.keepalive);
   }
 }
 

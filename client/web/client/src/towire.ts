@@ -22,6 +22,7 @@ import { FreeComponents, UpdateSchema, type Update as WireUpdate } from "./gen/l
 import { holdToWire, vector } from "./hold_kinds.js";
 import { bytesOfIndices, bytesOfNumbers, type Packer } from "./packer.js";
 import { rigidOf } from "./rotation.js";
+import { joined } from "./task.js";
 import type * as api from "./types.js";
 
 // From the values of this library to messages of the contract.
@@ -81,17 +82,14 @@ export function frameOptionsToWire(options: api.FrameOptions): MessageInitShape<
   };
 }
 
-export function meshToWire(mesh: api.Mesh, packer: Packer): WireMesh {
+export async function meshToWire(mesh: api.Mesh, packer: Packer): Promise<WireMesh> {
   const { scalar, bytes } = bytesOfNumbers(mesh.vertices);
   const faces = bytesOfIndices(mesh.faces);
-  const data = new Uint8Array(bytes.byteLength + faces.byteLength);
-  data.set(bytes);
-  data.set(faces, bytes.byteLength);
   return create(MeshSchema, {
     vertexCount: mesh.vertices.length / 3,
     faceCount: mesh.faces.length / 3,
     scalar,
-    data: packer.pack(data),
+    data: packer.pack(await joined(bytes, faces)),
   });
 }
 

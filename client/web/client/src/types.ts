@@ -249,6 +249,8 @@ export interface Frame {
   readonly quantized: QuantizedSurface | undefined;
   /** The received doubles of a frame in encoding "float64". */
   readonly doubles: DoubleSurface | undefined;
+  /** What is drawn of it, if the session has `shading`. */
+  readonly shaded: Shaded | undefined;
   /** The newest update that the frame answers: see Session.update; never falls. */
   readonly inputSeq: number;
   /** Rises within an epoch. */
@@ -424,6 +426,69 @@ export interface FrameOptions {
   encoding?: Encoding;
   /** The least precise encoding that the server may use to keep its limit of bytes per second; default: "quantized". */
   lowestEncoding?: Encoding;
+  /**
+   * Finds normals and the rest of what is drawn of each frame before it is given out, in a worker: an OpenMesh of
+   * "lpdeform-client/mesh", of the same mesh. Default: frames have no `shaded`.
+   */
+  shading?: FrameShading | undefined;
+}
+
+/** The vertices of a part of a frame: blocks of four 16-bit integers each, compressed or not. */
+export interface PackedPart {
+  firstVertex: number;
+  vertexCount: number;
+  vertices: Uint8Array;
+  /** Empty if the frame has none. */
+  normals: Uint8Array;
+}
+
+/** A quantized frame as it came. */
+export interface Packed {
+  vertexCount: number;
+  isCompressed: boolean;
+  quantization: Omit<QuantizedSurface, "vertices" | "normals">;
+  parts: PackedPart[];
+}
+
+export interface Unpacked {
+  quantized: QuantizedSurface;
+  positions: Float32Array;
+  distortion: Float32Array;
+  normals: Float32Array;
+}
+
+/** Unpacks frames, in the order in which they are given. The bytes of the parts may be gone afterwards. */
+export interface FrameUnpacker {
+  /** Rejects with a LpdeformError (FRAME_PARTS) if a block cannot be read. `shaded`: what is drawn of it, if that was found, too. */
+  unpack(packed: Packed): Promise<Unpacked & { shaded?: Shaded }>;
+}
+
+/** x, y, z of each drawn vertex and of its normal: the sums of the faces' normals, weighted by area; not of length 1. */
+export interface DrawnAt {
+  positions: Float32Array;
+  normals: Float32Array;
+}
+
+/** A frame as it is drawn. The arrays are of the drawn vertices, which are split at hard edges. */
+export interface Shaded extends DrawnAt {
+  /** Empty if the frame has none. */
+  distortion: Float32Array;
+  statistics: EnergyStatistics;
+  /** For each block of faces in the mesh's order of them the least x, y, z of its corners, and the largest. */
+  boxes: Float32Array;
+}
+
+/** What the side panel shows of the energies of the cells. */
+export interface EnergyStatistics {
+  max: number;
+  /** The energy drawn in full red: the 95th percentile, or the maximum if that percentile is 0. */
+  red: number;
+  /** The sum of the largest ceil(n/20) energies divided by the sum of all; 0 if all are 0. */
+  top5Share: number;
+}
+/** An OpenMesh is one. */
+export interface FrameShading extends FrameUnpacker {
+  shade(frame: { readonly positions: Float32Array; readonly distortion: Float32Array }): Promise<Shaded>;
 }
 
 export interface ConnectOptions {
@@ -446,7 +511,7 @@ export interface ConnectOptions {
 export interface OpenOptions extends ConnectOptions, FrameOptions {
   weights?: WeightKind;
   freeComponents?: FreeComponents;
-  weld?: Weld;
+  weld?: Weld | undefined;
   settings?: Settings;
   /** For opening only; close() ends an open session. */
   signal?: AbortSignal;

@@ -1,30 +1,6 @@
 import { decompress, distortionOf, loadDecompressor, normalsOf, positionsOf, uint16View } from "./decode.js";
 import { LpdeformError } from "./errors.js";
-import type { QuantizedSurface } from "./types.js";
-
-/** The vertices of a part of a frame: blocks of four 16-bit integers each, compressed or not. */
-export interface PackedPart {
-  firstVertex: number;
-  vertexCount: number;
-  vertices: Uint8Array;
-  /** Empty if the frame has none. */
-  normals: Uint8Array;
-}
-
-/** A quantized frame as it came. */
-export interface Packed {
-  vertexCount: number;
-  isCompressed: boolean;
-  quantization: Omit<QuantizedSurface, "vertices" | "normals">;
-  parts: PackedPart[];
-}
-
-export interface Unpacked {
-  quantized: QuantizedSurface;
-  positions: Float32Array;
-  distortion: Float32Array;
-  normals: Float32Array;
-}
+import type { FrameUnpacker, Packed, Unpacked } from "./types.js";
 
 /** Needs loadDecompressor() for compressed frames. Throws a LpdeformError (FRAME_PARTS) if a block cannot be read. */
 export function unpack({ vertexCount, isCompressed, quantization, parts }: Packed): Unpacked {
@@ -56,8 +32,10 @@ export type UnpackAnswer = { id: number; unpacked: Unpacked } | { id: number; fa
  * Unpacks frames in a worker of the page, in the order in which they are given; or in the page itself if it can have none, or if
  * the worker cannot be loaded.
  */
-export class Unpacker {
+export class Unpacker implements FrameUnpacker {
   #worker: Worker | undefined;
+  /** Whether the worker has answered; until then it may turn out that it cannot be loaded. */
+  #isProven = false;
   #lastId = 0;
   readonly #waiting = new Map<
     number,
@@ -74,15 +52,16 @@ export class Unpacker {
     }
   }
 
-  /** Rejects with a LpdeformError (FRAME_PARTS) if a block cannot be read. */
   unpack(packed: Packed): Promise<Unpacked> {
-    if (!this.#worker) return unpackInPage(packed);
+    if (!this.#worker) return unpackLoaded(packed);
     const id = ++this.#lastId;
-    this.#worker.postMessage({ id, packed } satisfies UnpackRequest);
+    const bytes = packed.parts.flatMap(({ vertices, normals }) => [vertices.buffer, normals.buffer] as ArrayBuffer[]);
+    this.#worker.postMessage({ id, packed } satisfies UnpackRequest, this.#isProven ? bytes : []);
     return new Promise((done, failed) => this.#waiting.set(id, { packed, done, failed }));
   }
 
   #take(answer: UnpackAnswer): void {
+    this.#isProven = true;
     const waiting = this.#waiting.get(answer.id);
     this.#waiting.delete(answer.id);
     if ("unpacked" in answer) waiting?.done(answer.unpacked);
@@ -92,12 +71,17 @@ export class Unpacker {
   #goOnInPage(): void {
     this.#worker?.terminate();
     this.#worker = undefined;
-    for (const { packed, done, failed } of this.#waiting.values()) unpackInPage(packed).then(done, failed);
+    for (const { packed, done, failed } of this.#waiting.values()) {
+      // What was handed over to a worker that had answered before is gone.
+      if (this.#isProven) failed(new LpdeformError("unavailable", "The worker that unpacks frames has ended."));
+      else unpackLoaded(packed).then(done, failed);
+    }
     this.#waiting.clear();
   }
 }
 
-async function unpackInPage(packed: Packed): Promise<Unpacked> {
+/** unpack() with its decoder. */
+export async function unpackLoaded(packed: Packed): Promise<Unpacked> {
   if (packed.isCompressed) await loadDecompressor();
   return unpack(packed);
 }

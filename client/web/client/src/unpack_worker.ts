@@ -1,5 +1,4 @@
-import { loadDecompressor } from "./decode.js";
-import { unpack, type UnpackAnswer, type UnpackRequest } from "./unpack.js";
+import { type UnpackAnswer, unpackLoaded, type UnpackRequest } from "./unpack.js";
 
 // The worker of Unpacker.
 const scope = globalThis as unknown as {
@@ -12,8 +11,7 @@ scope.onmessage = ({ data }) => (before = before.then(() => answer(data)));
 
 async function answer({ id, packed }: UnpackRequest): Promise<void> {
   try {
-    if (packed.isCompressed) await loadDecompressor();
-    const unpacked = unpack(packed);
+    const unpacked = await unpackLoaded(packed);
     const { quantized, positions, distortion, normals } = unpacked;
     const arrays = [quantized.vertices, quantized.normals, positions, distortion, normals];
     scope.postMessage(

@@ -6,7 +6,8 @@ import { newRequestId } from "./requestid.js";
 import type { Rpc } from "./rpc.js";
 import { pause } from "./waiting.js";
 
-const mostPartBytes = 1 << 20;
+/** A page is busy for about a millisecond with sending so many. */
+const mostPartBytes = 1 << 18;
 
 /** Bytes uploaded before a call, in parts with a checksum. */
 export class Uploads {

@@ -65,6 +65,14 @@ test("what is not used is not loaded", async () => {
   expect(errors).not.toContain("grpc");
 });
 
+test("reading of mesh files is loaded by those alone who ask for it, without the connection to a server", async () => {
+  const [first] = await chunksOf(`import { readMesh } from "lpdeform-client/mesh"; readMesh(new File([], "a.obj"));`);
+  expect(first).toContain("usemtl");
+  expect(first).not.toContain("grpc");
+  const session = `import { openSession } from "lpdeform-client"; openSession({ vertices: [], faces: [] });`;
+  for (const chunk of await chunksOf(session)) expect(chunk).not.toContain("usemtl");
+});
+
 test("the decompressor is loaded by those alone who ask for it", async () => {
   const chunks = await chunksOf(
     `import { openSession } from "lpdeform-client"; openSession({ vertices: [], faces: [] });`,

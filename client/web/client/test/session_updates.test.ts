@@ -203,7 +203,11 @@ describe("a part of an upload that the server has no room for yet", () => {
     const start = performance.now();
     opened.push(await openWith(server.rpc(), large, {}));
     expect(performance.now() - start).toBeGreaterThan(390);
-    expect(server.parts.map(({ offset }) => Number(offset) / 2 ** 20)).toEqual([0, 1, 1, 1, 2]);
+    expect(server.parts.map(({ offset }) => Number(offset) / 2 ** 20)).toEqual([
+      0,
+      ...[0.25, 0.25, 0.25],
+      ...[0.5, 0.75, 1, 1.25, 1.5, 1.75, 2, 2.25],
+    ]);
   });
 
   test("is sent again for no longer than a call may take", async () => {

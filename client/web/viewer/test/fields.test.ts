@@ -1,6 +1,6 @@
 import { expect, it } from "vitest";
 import { fromEuler, toEuler } from "../src/model/euler.js";
-import type { Vector3 } from "../src/model/mesh.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
 import { atRest, type Quaternion, turned } from "../src/model/pose.js";
 
 const distance = (a: Quaternion, b: Quaternion) =>

@@ -1,10 +1,10 @@
 import { describe, expect, it } from "vitest";
-import { MeshBuilder } from "../src/io/builder.js";
+import { MeshBuilder } from "lpdeform-client/mesh/builder";
 import { readHandleFile, writeHandleFile } from "../src/io/handlefile.js";
-import { writeObj } from "../src/io/obj.js";
-import { writeOff } from "../src/io/off.js";
-import { writePly } from "../src/io/ply.js";
-import { readMesh } from "../src/io/read.js";
+import { writeObj } from "../src/io/write_obj.js";
+import { writeOff } from "../src/io/write_off.js";
+import { writePly } from "../src/io/write_ply.js";
+import { parseMesh } from "lpdeform-client/mesh/read";
 import { writeStl } from "../src/io/write_stl.js";
 import { emptyDocument } from "../src/model/document.js";
 import { type HoldKind, holdKinds } from "../src/model/hold_kinds.js";
@@ -22,7 +22,7 @@ describe("meshes", () => {
     ["obj", bytes(writeObj(mesh))],
     ["ply", writePly(mesh, distortion, 3)],
   ] as const)("come back from %s as they went, to the last bit", (ending, written) => {
-    const read = readMesh(`creature.${ending}`, written);
+    const read = parseMesh(`creature.${ending}`, written);
     expect(read.positions).toEqual(mesh.positions);
     expect(read.faces).toEqual(mesh.faces);
   });
@@ -36,30 +36,30 @@ describe("meshes", () => {
       ["obj", bytes(writeObj(written))],
       ["ply", writePly(written, doubles, 3)],
     ] as const) {
-      const read = readMesh(`creature.${ending}`, file);
+      const read = parseMesh(`creature.${ending}`, file);
       expect(read.exact).toEqual(exact);
       expect(read.positions).toEqual(Float32Array.from(exact));
     }
-    expect(readMesh("a.off", bytes(writeOff(mesh))).exact).toBeUndefined();
+    expect(parseMesh("a.off", bytes(writeOff(mesh))).exact).toBeUndefined();
   });
 
   it("come back from STL with the same triangles", () => {
-    const read = readMesh("creature.stl", writeStl(mesh));
+    const read = parseMesh("creature.stl", writeStl(mesh));
     expect(read.positions.length).toBe(mesh.positions.length);
     const corners = ({ positions, faces }: typeof mesh) => [...faces].flatMap((v) => [...positions.subarray(3 * v, 3 * v + 3)]);
     expect(corners(read)).toEqual(corners(mesh));
   });
 
   it("are read with polygons, negative numbers, comments and texture coordinates", () => {
-    const square = readMesh("a.OBJ", bytes("# c\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1 -1/1 # quad\n"));
+    const square = parseMesh("a.OBJ", bytes("# c\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1 -1/1 # quad\n"));
     expect([...square.faces]).toEqual([0, 1, 2, 0, 2, 3]);
-    expect([...readMesh("a.off", bytes("OFF # x\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255 0 0\n")).faces]).toEqual([0, 1, 2]);
+    expect([...parseMesh("a.off", bytes("OFF # x\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255 0 0\n")).faces]).toEqual([0, 1, 2]);
     const ply =
       "ply\nformat ascii 1.0\ncomment c\nelement vertex 3\nproperty float nx\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n9 0 0 0\n9 1 0 0\n9 0 1 0\n3 0 1 2\n";
-    expect([...readMesh("a.ply", bytes(ply)).positions]).toEqual([0, 0, 0, 1, 0, 0, 0, 1, 0]);
+    expect([...parseMesh("a.ply", bytes(ply)).positions]).toEqual([0, 0, 0, 1, 0, 0, 0, 1, 0]);
     const stl =
       "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e0 0\nendloop\nendfacet\nendsolid";
-    expect([...readMesh("a.stl", bytes(stl)).faces]).toEqual([0, 1, 2]);
+    expect([...parseMesh("a.stl", bytes(stl)).faces]).toEqual([0, 1, 2]);
   });
 
   it("are read from PLY in the other byte order", () => {
@@ -69,7 +69,7 @@ describe("meshes", () => {
     [0, 0, 0, 1, 0, 0, 0, 1, 0].forEach((value, k) => view.setFloat64(8 * k, value));
     view.setUint8(72, 3);
     [0, 1, 2].forEach((value, k) => view.setUint32(73 + 4 * k, value));
-    const read = readMesh("a.ply", Uint8Array.from([...bytes(head), ...new Uint8Array(view.buffer)]));
+    const read = parseMesh("a.ply", Uint8Array.from([...bytes(head), ...new Uint8Array(view.buffer)]));
     expect([...read.faces]).toEqual([0, 1, 2]);
     expect(read.positions[3]).toBe(1);
   });
@@ -128,7 +128,7 @@ describe("meshes", () => {
     ["a.stl", "solid\nendsolid", "has no vertices"],
     ["a.stl", "solid\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nvertex 0 0 0\n", "a.stl ends within triangle 1"],
   ])("%s with a fault is refused by name: %s", (name, text, message) => {
-    expect(() => readMesh(name, bytes(text))).toThrow(message);
+    expect(() => parseMesh(name, bytes(text))).toThrow(message);
   });
 
   it("with more than a page can take are refused before they are taken in", () => {
@@ -142,8 +142,8 @@ describe("meshes", () => {
   });
 
   it("cut short is refused", () => {
-    expect(() => readMesh("a.stl", writeStl(mesh).subarray(0, 300))).toThrow("ends too soon");
-    expect(() => readMesh("a.ply", writePly(mesh, distortion, 1).subarray(0, 900))).toThrow("ends too soon");
+    expect(() => parseMesh("a.stl", writeStl(mesh).subarray(0, 300))).toThrow("ends too soon");
+    expect(() => parseMesh("a.ply", writePly(mesh, distortion, 1).subarray(0, 900))).toThrow("ends too soon");
   });
 });
 

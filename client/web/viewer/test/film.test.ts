@@ -1,8 +1,8 @@
 import { describe, expect, it } from "vitest";
 import { morphGlb } from "../src/io/gltf_morphs.js";
-import { readNumbers } from "../src/io/gltf_accessors.js";
-import { type Part, readGltfDocument } from "../src/io/gltf_document.js";
-import { readMesh } from "../src/io/read.js";
+import { readNumbers } from "lpdeform-client/mesh/gltf_accessors";
+import { type Part, readGltfDocument } from "lpdeform-client/mesh/gltf_document";
+import { parseMesh } from "lpdeform-client/mesh/read";
 import { addHandle, changeHandle, type Document, emptyDocument, handleOf } from "../src/model/document.js";
 import { momentsOf, shapeAt } from "../src/model/film.js";
 import { keyPoseOf } from "../src/model/key_poses.js";
@@ -62,7 +62,7 @@ describe("a film of poses", () => {
     }));
     const glb = morphGlb("a.off", new Uint32Array([0, 1, 2]), stills, 0.5);
     expect(await faultsOf(glb)).toEqual([]);
-    const mesh = readMesh("a.glb", glb);
+    const mesh = parseMesh("a.glb", glb);
     expect([mesh.positions, mesh.faces]).toEqual([rest, new Uint32Array([0, 1, 2])]);
     const document = readGltfDocument("a.glb", glb, new Map());
     const [{ primitives, extras }] = document.json["meshes"] as [{ primitives: [Part]; extras: Part }];

@@ -1,8 +1,8 @@
 import { ShaderMaterial } from "three";
 import { expect, it, vi } from "vitest";
 import { readGltfTextures } from "../src/io/gltf_textures.js";
-import { readMesh } from "../src/io/read.js";
-import { readGltfDocument, writeGlb } from "../src/io/gltf_document.js";
+import { parseMesh } from "lpdeform-client/mesh/read";
+import { readGltfDocument, writeGlb } from "lpdeform-client/mesh/gltf_document";
 import { decoded, Textured } from "../src/stage/textured.js";
 import { columns, makeGlb } from "./made_glb.js";
 import { pngOf } from "./png.js";
@@ -12,7 +12,7 @@ const picture = pngOf(2, 1, [255, 0, 0, 0, 255, 0]);
 it("a texture has a place for each corner, and the image of the file", async () => {
   const glb = makeGlb(false, picture);
   const { coordinates, corners, layers } = readGltfTextures("a.glb", glb);
-  const mesh = readMesh("a.glb", glb);
+  const mesh = parseMesh("a.glb", glb);
   expect(corners).toEqual(mesh.faces);
   expect(layers.map(({ faceCount }) => faceCount).reduce((sum, count) => sum + count)).toBe(mesh.faces.length / 3);
   const at = 2 * (3 * (columns + 1) + 4); // row 3, column 4

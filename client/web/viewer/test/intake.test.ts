@@ -1,16 +1,16 @@
 import { expect, it } from "vitest";
 import { aheadOf } from "../src/model/ahead.js";
-import { derivedOf, know, shownOf } from "../src/model/derived.js";
+import { derivedOf, isKnown, know, usualWelding } from "lpdeform-client/mesh/derived";
 import { addHandle, changeHandle, emptyDocument } from "../src/model/document.js";
-import { blockBoxes, faceOrder } from "../src/model/face_blocks.js";
-import { boundsOf } from "../src/model/mesh.js";
-import { pullOf } from "../src/model/pull.js";
+import { blockBoxes, faceOrder } from "lpdeform-client/mesh/face_blocks";
+import { boundsOf, type Mesh } from "lpdeform-client/mesh/mesh";
+import { pullOf } from "lpdeform-client/mesh/pull";
 import { raycast } from "../src/model/raycast.js";
 import { shapeKinds } from "../src/model/shapes.js";
-import { energyStatistics } from "../src/model/statistics.js";
-import { DrawMesh } from "../src/stage/drawmesh.js";
-import { IntakeWorker, Taking } from "../src/stage/intake.js";
-import { openedMesh } from "../src/io/opened.js";
+import { energyStatistics } from "lpdeform-client/mesh/statistics";
+import { drawnAt, spread } from "lpdeform-client/mesh/drawmesh";
+import { shadedOf } from "lpdeform-client/mesh/shaded";
+import { openedMesh, workerOf } from "../src/io/opened.js";
 import { splitTube } from "./split_tube.js";
 
 const { mesh } = shapeKinds.find(({ id }) => id === "creature")!.make("medium");
@@ -48,43 +48,49 @@ it("a ray along an axis, in the plane of flat boxes, hits", () => {
   expect(raycast(square, two, [0.2, 0.5, 3], [0, 0, -1], blocks)?.distance).toBe(3);
 });
 
-it("what a worker takes of a frame is what the page would take", () => {
-  const { adjacency, drawn } = shownOf(mesh, faces);
-  const { order } = derivedOf(mesh);
+it("what is drawn of a surface is found in new arrays, with its statistics and boxes", () => {
+  const derived = derivedOf(mesh);
+  const { drawn } = derived.shown;
   const distortion = Float32Array.from({ length: positions.length / 3 }, (_, vertex) => vertex % 97);
-  const taking = new Taking({ positions, faces, drawn, adjacency, order });
-  const intake = taking.take({ positions: bent, distortion });
-  const draw = new DrawMesh(mesh);
-  draw.take(bent);
-  const values = new Float32Array(draw.source.length);
-  draw.spread(distortion, values);
-  expect(intake.positions).toEqual(draw.positions);
-  expect(intake.normals).toEqual(draw.normals);
-  expect(intake.distortion).toEqual(values);
-  expect(intake.boxes).toEqual(blockBoxes(bent, faces, order));
-  expect(intake.statistics).toEqual(energyStatistics(distortion));
+  const shaded = shadedOf({ positions: bent, distortion }, mesh, derived);
+  const values = new Float32Array(drawn.source.length);
+  spread(distortion, drawn, values);
+  expect(shaded).toEqual({
+    ...drawnAt(bent, drawn),
+    distortion: values,
+    boxes: blockBoxes(bent, faces, derived.order),
+    statistics: energyStatistics(distortion),
+  });
   // Its memory goes to the page, so the next frame must not be in it.
-  expect(taking.take({ positions, distortion }).positions.buffer).not.toBe(intake.positions.buffer);
-  expect(IntakeWorker.start({ positions, faces, drawn, adjacency, order })).toBeUndefined(); // few vertices
+  expect(shadedOf({ positions, distortion }, mesh, derived).positions.buffer).not.toBe(shaded.positions.buffer);
+  expect(shadedOf({ positions, distortion: new Float32Array(0) }, mesh, derived).distortion).toHaveLength(0);
 });
 
-it("what was found of a mesh elsewhere is not found again, welded or not", () => {
+it("what was found of a mesh elsewhere is not found again", () => {
   const tube = splitTube(12, 4);
   const derived = derivedOf(tube);
   const copy = { ...tube };
   know(copy, derived);
   expect(derivedOf(copy)).toBe(derived);
-  expect(shownOf(copy, derived.seams!.faces)).toBe(derived.shown);
-  expect(shownOf(copy, copy.faces)).not.toBe(derived.shown);
-  expect(shownOf(copy, copy.faces)).toBe(shownOf(copy, copy.faces));
+  expect(isKnown(copy, usualWelding)).toBe(true);
+  expect(isKnown(copy, { ...usualWelding, isOn: false })).toBe(false);
 });
 
 it("a large file is read where there are no workers, too", async () => {
   const lines = [...Array(20_000).keys()].map((k) => `v ${k % 100} ${Math.floor(k / 100)} 0`);
   const file = new File([`${lines.join("\n")}\nf 1 2 102\n`], "long.obj");
   expect(file.size).toBeGreaterThan(200_000);
-  expect((await openedMesh(file, [])).positions.length).toBe(60_000);
+  const read = await openedMesh(file, []);
+  expect(read.positions.length).toBe(60_000);
+  // Its frames are taken without a worker, too.
+  const { shaded } = await frameOf(read);
+  expect(shaded.positions).toEqual(derivedOf(read).shown.atRest.positions);
 });
+
+async function frameOf(read: Mesh) {
+  const distortion = new Float32Array(read.positions.length / 3);
+  return { shaded: await workerOf(read)!.shade({ positions: read.positions, distortion }) };
+}
 
 it("vertices go along with a handle that is pulled, the less the nearer they are to what is held", () => {
   const { adjacency } = derivedOf(mesh).shown;

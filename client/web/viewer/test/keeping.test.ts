@@ -1,10 +1,10 @@
 import { describe, expect, it } from "vitest";
-import { writeObj } from "../src/io/obj.js";
+import { writeObj } from "../src/io/write_obj.js";
 import { rewriteObj } from "../src/io/obj_rewrite.js";
-import { writeOff } from "../src/io/off.js";
-import { writePly } from "../src/io/ply.js";
-import { readMesh } from "../src/io/read.js";
-import { type Mesh, polygonsOf } from "../src/model/mesh.js";
+import { writeOff } from "../src/io/write_off.js";
+import { writePly } from "../src/io/write_ply.js";
+import { parseMesh } from "lpdeform-client/mesh/read";
+import { type Mesh, polygonsOf } from "lpdeform-client/mesh/mesh";
 
 const bytes = (text: string) => new TextEncoder().encode(text);
 
@@ -35,7 +35,7 @@ usemtl blue
 f -7/1/2 2/2/2 6/3/-1 7/3/2 5//2 # a pentagon
 l 1 2
 `;
-const read = () => readMesh("box.obj", bytes(file)) as Mesh & { obj: Uint8Array };
+const read = () => parseMesh("box.obj", bytes(file)) as Mesh & { obj: Uint8Array };
 const at = ({ positions, exact }: Mesh) => [...(exact ?? positions)];
 /** A quarter turn about x, and away. */
 const turned = (positions: readonly number[]) =>
@@ -61,7 +61,7 @@ describe("an OBJ file that is saved again", () => {
 
   it("has the positions that it is given, to the last bit, and the same faces", () => {
     const positions = turned(at(read()));
-    const again = readMesh("box.obj", bytes(rewriteObj(read(), positions)));
+    const again = parseMesh("box.obj", bytes(rewriteObj(read(), positions)));
     expect(at(again)).toEqual([...positions]);
     expect([again.faces, again.corners]).toEqual([read().faces, read().corners]);
     expect([...again.beside!].sort()).toEqual([...read().beside!].sort()); // normals come later in it
@@ -96,17 +96,19 @@ describe("an OBJ file that is saved again", () => {
   });
 
   it.each(["\r\n", "\r"])("may have lines that end in %j", (end) => {
-    const mesh = readMesh("box.obj", bytes(file.replaceAll("\n", end))) as Mesh & { obj: Uint8Array };
+    const mesh = parseMesh("box.obj", bytes(file.replaceAll("\n", end))) as Mesh & { obj: Uint8Array };
     const written = rewriteObj(mesh, turned(at(read())));
     expect(written.replaceAll(end, "")).not.toMatch(/[\r\n]/);
-    const again = readMesh("box.obj", bytes(written));
+    const again = parseMesh("box.obj", bytes(written));
     expect(at(again)).toEqual([...turned(at(read()))]);
     expect(again.corners).toEqual(read().corners);
     expect([...again.beside!].sort()).toEqual([...read().beside!].sort());
   });
 
   it("keeps a normal where the surface has no direction", () => {
-    const flat = readMesh("a.obj", bytes("v 0 0 0\nv 1 0 0\nv 2 0 0\nvn 0 0 1\nf 1//1 2//1 3//1\n")) as ReturnType<typeof read>;
+    const flat = parseMesh("a.obj", bytes("v 0 0 0\nv 1 0 0\nv 2 0 0\nvn 0 0 1\nf 1//1 2//1 3//1\n")) as ReturnType<
+      typeof read
+    >;
     expect(lines(rewriteObj(flat, flat.positions), "vn")).toEqual(["vn 0 0 1", "vn 0 0 1", "vn 0 0 1"]);
   });
 });
@@ -117,7 +119,7 @@ describe("polygons", () => {
     ["off", (mesh: Mesh) => bytes(writeOff(mesh))],
     ["ply", (mesh: Mesh) => writePly(mesh, new Float32Array(7), 1)],
   ] as const)("are saved as such in %s", (ending, write) => {
-    const again = readMesh(`box.${ending}`, write(read()));
+    const again = parseMesh(`box.${ending}`, write(read()));
     expect([...polygonsOf(again)]).toEqual([
       [0, 3, 2, 1],
       [0, 1, 5, 6, 4],
@@ -129,8 +131,8 @@ describe("polygons", () => {
     const corners = 300;
     const circle = Array.from({ length: corners }, (_, k) => [Math.cos(k / 50), Math.sin(k / 50), 0].join(" "));
     const face = Array.from({ length: corners }, (_, k) => k);
-    const mesh = readMesh("a.off", bytes(`OFF\n${corners} 1 0\n${circle.join("\n")}\n${corners} ${face.join(" ")}\n`));
-    const again = readMesh("a.ply", writePly(mesh, new Float32Array(corners), 1));
+    const mesh = parseMesh("a.off", bytes(`OFF\n${corners} 1 0\n${circle.join("\n")}\n${corners} ${face.join(" ")}\n`));
+    const again = parseMesh("a.ply", writePly(mesh, new Float32Array(corners), 1));
     expect([...polygonsOf(again)]).toEqual([face]);
   });
 });
@@ -167,11 +169,11 @@ describe("what a file has beside", () => {
       ["solids"],
     ],
   ])("is named: %s %#", (name, text, beside) => {
-    expect(readMesh(name, bytes(text)).beside).toEqual(beside);
+    expect(parseMesh(name, bytes(text)).beside).toEqual(beside);
   });
 
   it("is not the distortion that this page saves", () => {
-    const mesh = readMesh("a.off", bytes("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"));
-    expect(readMesh("a.ply", writePly(mesh, new Float32Array(3), 1)).beside).toBeUndefined();
+    const mesh = parseMesh("a.off", bytes("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"));
+    expect(parseMesh("a.ply", writePly(mesh, new Float32Array(3), 1)).beside).toBeUndefined();
   });
 });

@@ -20,7 +20,8 @@ import {
 } from "../src/model/document.js";
 import { quaternionOf, scaled } from "../src/model/pose.js";
 import { shapeKinds } from "../src/model/shapes.js";
-import { DrawMesh } from "../src/stage/drawmesh.js";
+import { drawnAt, spread } from "lpdeform-client/mesh/drawmesh";
+import { drawnOf } from "lpdeform-client/mesh/drawn";
 
 const rest = Float32Array.from({ length: 30 }, (_, k) => k);
 const mesh = { positions: rest, faces: new Uint32Array([0, 1, 2]) };
@@ -223,7 +224,7 @@ describe("what is drawn", () => {
   it("has hard edges where they are sharp, and none where it is smooth", () => {
     const { mesh: bar } = shapeKinds[0]!.make("coarse");
     const { mesh: creature } = shapeKinds[3]!.make("coarse");
-    const [sharp, smooth] = [new DrawMesh(bar), new DrawMesh(creature)];
+    const [sharp, smooth] = [drawnOf(bar), drawnOf(creature)];
     const cells = 4;
     const height = 21;
     // Each corner is drawn three times, each other vertex of an edge twice.
@@ -234,27 +235,31 @@ describe("what is drawn", () => {
 
   it("knows whether it has an inside that nobody sees", () => {
     const { mesh } = shapeKinds[0]!.make("coarse");
-    expect(new DrawMesh(mesh).isClosed).toBe(true);
-    expect(new DrawMesh({ ...mesh, faces: mesh.faces.slice(3) }).isClosed).toBe(false);
-    expect(new DrawMesh({ ...mesh, faces: Uint32Array.from([...mesh.faces, 0, 1, 2]) }).isClosed).toBe(false);
+    expect(drawnOf(mesh).isClosed).toBe(true);
+    expect(drawnOf({ ...mesh, faces: mesh.faces.slice(3) }).isClosed).toBe(false);
+    expect(drawnOf({ ...mesh, faces: Uint32Array.from([...mesh.faces, 0, 1, 2]) }).isClosed).toBe(false);
   });
 
   it("follows the mesh's vertices, with normals that look outwards", () => {
     const { mesh } = shapeKinds[0]!.make("coarse");
-    const draw = new DrawMesh(mesh);
-    draw.take(mesh.positions.map((value) => 2 * value));
-    for (let k = 0; k < draw.source.length; ++k) {
+    const drawn = drawnOf(mesh);
+    const draw = drawnAt(
+      mesh.positions.map((value) => 2 * value),
+      drawn,
+    );
+    for (let k = 0; k < drawn.source.length; ++k) {
       for (let axis = 0; axis < 3; ++axis)
-        expect(draw.positions[3 * k + axis]).toBe(2 * mesh.positions[3 * draw.source[k]! + axis]!);
+        expect(draw.positions[3 * k + axis]).toBe(2 * mesh.positions[3 * drawn.source[k]! + axis]!);
     }
     const top = draw.positions.findIndex((value, k) => k % 3 === 2 && value > 10.4 && draw.normals[k]! > 0);
     expect(top).toBeGreaterThan(0);
-    const values = new Float32Array(draw.source.length);
-    draw.spread(
+    const values = new Float32Array(drawn.source.length);
+    spread(
       Float32Array.from({ length: mesh.positions.length / 3 }, (_, vertex) => vertex),
+      drawn,
       values,
     );
-    expect([...values]).toEqual([...draw.source]);
+    expect([...values]).toEqual([...drawn.source]);
   });
 });
 

@@ -1,5 +1,5 @@
-import { boundsOf } from "../src/io/gltf.js";
-import { writeGlb } from "../src/io/gltf_document.js";
+import { boundsOf } from "../src/io/write_glb.js";
+import { writeGlb } from "lpdeform-client/mesh/gltf_document";
 
 const pixel = Uint8Array.from(
   atob("iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="),

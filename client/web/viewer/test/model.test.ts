@@ -1,18 +1,18 @@
 import { cornersOf, linesOf, trianglesOf, within } from "../src/model/pointed.js";
 import { describe, expect, it } from "vitest";
-import { adjacencyOf, meanEdge } from "../src/model/adjacency.js";
+import { adjacencyOf, meanEdge } from "lpdeform-client/mesh/adjacency";
 import { isAlike } from "../src/model/alike.js";
 import { colourIn } from "../src/model/palettes.js";
 import { fitPose } from "../src/model/fit.js";
 import { emptyDocument, paint } from "../src/model/document.js";
 import { stepsToKeep } from "../src/model/kept_steps.js";
 import { History } from "../src/model/history.js";
-import { boundsOf } from "../src/model/mesh.js";
+import { boundsOf } from "lpdeform-client/mesh/mesh";
 import { follow, placesOf } from "../src/model/places.js";
 import { add, anchorOf, apply, axisAngle, quaternionOf, subtract, toMotion, turned, type Pose } from "../src/model/pose.js";
 import { raycast } from "../src/model/raycast.js";
 import { boxPolygon, dab, facing, insidePolygon, project } from "../src/model/selection.js";
-import { energyStatistics, histogram, percentile } from "../src/model/statistics.js";
+import { energyStatistics, histogram, percentile } from "lpdeform-client/mesh/statistics";
 
 /** 4 by 4 vertices, one apart, in the plane z = 0. */
 const grid = (() => {

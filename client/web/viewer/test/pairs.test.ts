@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { Pairs } from "../src/model/pairs.js";
+import { Pairs } from "lpdeform-client/mesh/pairs";
 
 it("pairs have numbers as a map has them, whatever falls on the same place", () => {
   const count = 5000;

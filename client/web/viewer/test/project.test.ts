@@ -1,13 +1,13 @@
 import { gunzipSync, gzipSync } from "node:zlib";
 import { describe, expect, it } from "vitest";
-import { newGlb } from "../src/io/gltf.js";
+import { newGlb } from "../src/io/write_glb.js";
 import { gunzip, gzip } from "../src/io/gzip.js";
 import { type Project, readProject, writeProject } from "../src/io/project.js";
-import { readMesh } from "../src/io/read.js";
-import { writeObj } from "../src/io/obj.js";
+import { parseMesh } from "lpdeform-client/mesh/read";
+import { writeObj } from "../src/io/write_obj.js";
 import { addHandle, changeHandle, type Document, paint } from "../src/model/document.js";
 import { keyPoseOf } from "../src/model/key_poses.js";
-import type { Vector3 } from "../src/model/mesh.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
 import { apply, quaternionOf, scaled } from "../src/model/pose.js";
 import { shapeKinds } from "../src/model/shapes.js";
 import { firstView } from "../src/model/view.js";
@@ -96,13 +96,13 @@ describe("a project", () => {
   });
 
   it("has doubles, polygons, and an OBJ or GLB file whole", async () => {
-    const off = readMesh(
+    const off = parseMesh(
       "a.off",
       new TextEncoder().encode("OFF\n5 2 0\n0 0 0\n1.1 0 0\n1 1 0\n0 1 0\n2 2 0.3\n4 0 1 2 3\n3 1 4 2\n"),
     );
     expect([off.exact, off.corners]).not.toContain(undefined);
-    const obj = readMesh("b.obj", new TextEncoder().encode(`# mine\nvt 0 1\n${writeObj(shape.mesh)}`));
-    const gltf = readMesh("c.glb", newGlb(shape.mesh));
+    const obj = parseMesh("b.obj", new TextEncoder().encode(`# mine\nvt 0 1\n${writeObj(shape.mesh)}`));
+    const gltf = parseMesh("c.glb", newGlb(shape.mesh));
     for (const mesh of [off, obj, gltf]) {
       const document = addHandle({ ...shape.document, handles: [] }, [0, 1], mesh.positions);
       expect((await read(await writeProject({ ...project, mesh, document }))).mesh).toEqual(mesh);

@@ -1,6 +1,7 @@
+import { usualWelding } from "lpdeform-client/mesh/derived";
 import { expect, it } from "vitest";
-import type { Mesh } from "../src/model/mesh.js";
-import { seamsOf } from "../src/model/seams.js";
+import { boundsOf, type Mesh } from "lpdeform-client/mesh/mesh";
+import { seamsOf } from "lpdeform-client/mesh/seams";
 import { shapeKinds } from "../src/model/shapes.js";
 import { splitTube } from "./split_tube.js";
 
@@ -19,9 +20,11 @@ function together(...meshes: Mesh[]): Mesh {
   return { name: "together", positions, faces: Uint32Array.from(faces) };
 }
 
+const { tolerance: usual } = usualWelding;
+
 it("vertices in one place on open borders are found, and the faces that use them", () => {
   const mesh = splitTube(columns, rows);
-  const seams = seamsOf(mesh)!;
+  const seams = seamsOf(mesh, usual)!;
   expect(seams.copyCount).toBe(rows + 1);
   // Row by row, each with one column more than there are places.
   const first = Array.from({ length: rows + 1 }, (_, row) => row * (columns + 1));
@@ -39,7 +42,21 @@ it.each([
   const mesh = splitTube(columns, rows);
   const exact = Float64Array.from(mesh.positions);
   for (let row = 0; row <= rows; ++row) exact[3 * (row * (columns + 1) + columns)]! += share;
-  expect(seamsOf({ ...mesh, exact }) !== undefined).toBe(isSeam);
+  expect(seamsOf({ ...mesh, exact }, usual) !== undefined).toBe(isSeam);
+});
+
+it.each([
+  [0, 0, true],
+  [0, 1e-7, false],
+  [1e-3, 5e-4, true],
+  [1e-3, 2e-3, false],
+])("with a tolerance of %d, what is %d of the size apart counts as in one place: %s", (tolerance, share, isSeam) => {
+  const mesh = splitTube(columns, rows);
+  const { diagonal } = boundsOf(mesh.positions, mesh.faces);
+  const exact = Float64Array.from(mesh.positions);
+  for (let row = 0; row <= rows; ++row) exact[3 * (row * (columns + 1) + columns)]! += share * diagonal;
+  const seams = seamsOf({ ...mesh, exact }, tolerance);
+  expect(seams?.copyCount).toBe(isSeam ? rows + 1 : undefined);
 });
 
 it("also where that lies on both sides of 0, or of any other number", () => {
@@ -50,15 +67,15 @@ it("also where that lies on both sides of 0, or of any other number", () => {
       exact[3 * (row * (columns + 1)) + 1] = shift - 1e-10;
       exact[3 * (row * (columns + 1) + columns) + 1] = shift + 1e-10;
     }
-    expect(seamsOf({ ...mesh, exact })?.copyCount).toBe(rows + 1);
+    expect(seamsOf({ ...mesh, exact }, usual)?.copyCount).toBe(rows + 1);
   }
 });
 
 it("surfaces that are closed, or whose borders lie apart, have none", () => {
   const { mesh } = shapeKinds.find(({ id }) => id === "block")!.make("coarse");
-  expect(seamsOf(mesh)).toBeUndefined();
-  expect(seamsOf(together(mesh, mesh))).toBeUndefined(); // in one place, and yet two bodies
-  for (const { make } of shapeKinds) expect(seamsOf(make("coarse").mesh)).toBeUndefined();
+  expect(seamsOf(mesh, usual)).toBeUndefined();
+  expect(seamsOf(together(mesh, mesh), usual)).toBeUndefined(); // in one place, and yet two bodies
+  for (const { make } of shapeKinds) expect(seamsOf(make("coarse").mesh, usual)).toBeUndefined();
 });
 
 it("any number may be in one place", () => {
@@ -66,7 +83,7 @@ it("any number may be in one place", () => {
   const positions = new Float32Array(3 * count);
   positions[0] = 1; // the rest lie on the origin
   const faces = Uint32Array.from({ length: count }, (_, corner) => corner);
-  const seams = seamsOf({ name: "heap", positions, faces })!;
+  const seams = seamsOf({ name: "heap", positions, faces }, usual)!;
   expect([seams.copyCount, seams.groups[1], seams.groups[count - 1]]).toEqual([count - 2, 1, 1]);
 });
 
@@ -77,5 +94,5 @@ it("a heap of single triangles is one surface", () => {
     positions: Float32Array.from([...mesh.faces].flatMap((vertex) => [...mesh.positions.subarray(3 * vertex, 3 * vertex + 3)])),
     faces: Uint32Array.from({ length: mesh.faces.length }, (_, corner) => corner),
   };
-  expect(new Set(seamsOf(heap)!.groups).size).toBe(mesh.positions.length / 3);
+  expect(new Set(seamsOf(heap, usual)!.groups).size).toBe(mesh.positions.length / 3);
 });

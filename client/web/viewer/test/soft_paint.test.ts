@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { adjacencyOf } from "../src/model/adjacency.js";
+import { adjacencyOf } from "lpdeform-client/mesh/adjacency";
 import { emptyDocument } from "../src/model/document.js";
 import { type Brush, paintSoftly, strengthAt } from "../src/model/soft_paint.js";
 

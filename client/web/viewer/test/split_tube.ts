@@ -1,4 +1,4 @@
-import type { Mesh } from "../src/model/mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 
 /** An open tube along z, of radius 1 and height `rows`: its first and last column are in one place, as texture coordinates have it. */
 export function splitTube(columns: number, rows: number): Mesh {

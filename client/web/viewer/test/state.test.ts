@@ -76,6 +76,33 @@ describe("the pulse", () => {
     pulse.stop();
   });
 
+  it("counts what a page is late by, up to a quarter of a second a beat: neither drawing nor a long pause delays or fakes it", async () => {
+    let late = 0;
+    let now = 0;
+    vi.spyOn(performance, "now").mockImplementation(() => now);
+    const beats = async (count: number) => {
+      for (let k = 0; k < count; ++k) {
+        now += 100 + late;
+        await after(100);
+      }
+    };
+    const told: boolean[] = [];
+    const pulse: Pulse = new Pulse(
+      () => new Promise(() => undefined),
+      () => told.push(pulse.isSilent),
+    );
+    pulse.start();
+    await beats(4); // asks
+    late = 10_000;
+    await beats(1); // the page itself was away
+    expect(told).toEqual([]);
+    late = 140;
+    await beats(3);
+    expect(told).toEqual([true]);
+    pulse.stop();
+    vi.restoreAllMocks();
+  });
+
   it("asks nothing while something comes from the server, and is not silent as soon as something does", async () => {
     const ask = vi.fn<() => Promise<void>>(() => new Promise(() => undefined));
     const told: boolean[] = [];

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
-import { adjacencyOf } from "../src/model/adjacency.js";
+import { adjacencyOf } from "lpdeform-client/mesh/adjacency";
 import { addHandle, changeHandle, type Document, emptyDocument, handleOf, removeHandle } from "../src/model/document.js";
-import { boundsOf, type Vector3 } from "../src/model/mesh.js";
+import { boundsOf, type Vector3 } from "lpdeform-client/mesh/mesh";
 import { Mirror } from "../src/model/mirror.js";
 import { apply, quaternionOf } from "../src/model/pose.js";
 import { partnerOf, symmetric } from "../src/model/symmetric.js";
@@ -97,6 +97,32 @@ describe("symmetric work", () => {
     ]);
     expect(handleOf(after, "right")!.pose).toBe(own);
     expectClose(handleOf(after, "left")!.pose.translation, [-5, 5, 5]);
+  });
+
+  it("reflects places of their own vertex by vertex, whatever the partner had", () => {
+    const targets = [1, 2, 3, 4, 5, 6]; // of the vertices 0 and 5
+    const after = handleOf(change(both, "left", { targets }), "right")!;
+    expect(after.vertices).toEqual([9, 4]);
+    expect(after.targets).toEqual([10, 5, 6, 13, 2, 3]); // of the images of 5 and of 0
+    // A partner that was given places follows a pose as a whole.
+    const placed = changeHandle(both, "right", { targets: [1, 1, 1, 2, 2, 2] });
+    const posed = handleOf(change(placed, "left", { pose }), "right")!;
+    expect(posed.targets).toBeUndefined();
+    for (const vertex of [0, 5]) {
+      expectClose(apply(posed.pose, place(mirror.imageOf(vertex)!)), mirror.reflected(apply(pose, place(vertex))));
+    }
+    // What has no image among the handle's vertices stays where it is.
+    const larger = changeHandle(both, "right", { vertices: [9, 4, 14] });
+    const partly = handleOf(symmetric(larger, changeHandle(larger, "left", { targets }), mirror, []), "right")!;
+    expect(partly.targets!.slice(6)).toEqual([...place(14)]);
+    const locked = changeHandle(both, "right", { isLocked: true });
+    expect(handleOf(change(locked, "left", { targets }), "right")!.targets).toBeUndefined();
+  });
+
+  it("makes places of a handle on the plane alike on both sides", () => {
+    const across = addHandle(emptyDocument, [1, 3], positions, { name: "across" });
+    const after = handleOf(change(across, "across", { targets: [0, 1, 2, 10, 3, 4] }), "across")!;
+    expect(after.targets).toEqual([2, 2, 3, 12, 2, 3]);
   });
 
   it("holds, locks and deletes on both sides, and does not move what is locked there", () => {

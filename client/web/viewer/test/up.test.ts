@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { guessYUp } from "../src/model/up.js";
+import { guessYUp } from "lpdeform-client/mesh/up";
 
 /** A pyramid that stands on a square, its tip along `up`; with `isDouble`, one on each side of the square. */
 function pyramid(up: 1 | 2, name: string, isDouble = false) {

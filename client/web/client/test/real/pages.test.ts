@@ -82,6 +82,39 @@ test("three.js: the cylinder bends to where its end is dragged", async () => {
   expect(errors).toEqual([]);
 }, 120_000);
 
+/** A tube about the y axis, as a file of many lines: its vertices are split along a seam. */
+function tubeObj(around = 40, along = 150): string {
+  const lines: string[] = [];
+  for (let ring = 0; ring <= along; ++ring) {
+    for (let k = 0; k <= around; ++k) {
+      const turn = (2 * Math.PI * (k % around)) / around;
+      lines.push(`v ${0.3 * Math.cos(turn)} ${(3 * ring) / along} ${0.3 * Math.sin(turn)}`);
+    }
+  }
+  for (let ring = 0; ring < along; ++ring) {
+    for (let k = 1; k <= around; ++k) {
+      const a = ring * (around + 1) + k;
+      lines.push(`f ${a} ${a + around + 1} ${a + around + 2} ${a + 1}`);
+    }
+  }
+  return lines.join("\n");
+}
+
+test("a file: a worker reads, welds and shades it, and says what is wrong with one that is damaged", async () => {
+  const { page, errors } = await open("file");
+  const choose = (text: string) =>
+    page.getByLabel("Mesh").setInputFiles({ name: "tube.obj", mimeType: "model/obj", buffer: Buffer.from(text) });
+  await choose(`${tubeObj()}\nf 1 2 9999`);
+  await page.getByText("tube.obj, line 12192: face 6001 has the corner “9999”; there are 6191 vertices.").waitFor();
+  await choose(tubeObj());
+  await page.getByText("6191 vertices.").waitFor();
+  await until(page, isStraight);
+  await page.getByLabel("Shift").fill("0.4");
+  await until(page, ({ left, right }) => right > 1.5 * left);
+  expect(page.workers()).toHaveLength(1);
+  expect(errors).toEqual([]);
+}, 120_000);
+
 test("React: the cylinder bends as the slider says", async () => {
   const { page, errors } = await open("react");
   await until(page, isStraight);

@@ -207,3 +207,37 @@ test.each(["dev", "preview"])(
   },
   120_000,
 );
+
+test.each(["dev", "preview"])(
+  "a mesh file is read, and its frames shaded, in a worker, on a page of %s",
+  async (command) => {
+    writeFileSync(
+      join(project, "main.ts"),
+      `
+    import { openSession } from "lpdeform-client";
+    import { readMesh } from "lpdeform-client/mesh";
+    const side = 120;
+    const lines = Array.from({ length: side * side }, (_, i) => \`v \${i % side} \${Math.floor(i / side)} 0\`);
+    for (let i = 1; i < side * (side - 1); ++i) if (i % side) lines.push(\`f \${i} \${i + 1} \${i + side + 1} \${i + side}\`);
+    const opened = await readMesh(new File([lines.join("\\n")], "sheet.obj"));
+    const edge = (x: number) => Array.from({ length: side }, (_, y) => side * y + x);
+    const session = await openSession(opened.sessionMesh, {
+      url: ${JSON.stringify(service.url)}, weld: opened.weld, shading: opened,
+    });
+    session.setHandles({ left: { vertices: edge(0) }, right: { vertices: edge(side - 1), motion: { translation: [0, 0, 9] } } });
+    const { shaded } = await session.settle();
+    const at = opened.derived.shown.drawn.source.indexOf(side - 1);
+    document.body.append(\`The edge is drawn at height \${shaded!.positions[3 * at + 2]!.toFixed(1)}, \`);
+    document.body.append(\`and its normal \${shaded!.normals[3 * at + 2]! > 0 ? "looks up" : "does not"}.\`);
+  `,
+    );
+    if (command === "preview") run(process.execPath, vite(), "build", "--target", "es2022");
+    await serve(command);
+    const { page, errors } = await opened();
+    await page.getByText("The edge is drawn at height 9.0, and its normal looks up.").waitFor();
+    expect(page.workers()).toHaveLength(1);
+    expect(errors).toEqual([]);
+    await page.close();
+  },
+  120_000,
+);

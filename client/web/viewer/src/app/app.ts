@@ -1,27 +1,28 @@
 import type { MeshReport } from "lpdeform-client";
-import { type Adjacency, adjacencyOf } from "../model/adjacency.js";
+import { type Adjacency, adjacencyOf } from "lpdeform-client/mesh/adjacency";
 import { type AxisView, directionOf, viewAfter } from "../model/axis_views.js";
-import { derivedOf, shownOf } from "../model/derived.js";
+import { derivedOf, isKnown, usualWelding, type Welding } from "lpdeform-client/mesh/derived";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
 import type { Shape } from "../model/blend.js";
 import { isAlike } from "../model/alike.js";
 import { History, type Steps } from "../model/history.js";
 import { keyPoseOf } from "../model/key_poses.js";
 import { kindOf } from "../model/hold_kinds.js";
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { Mirror, mirrorAxes, type Symmetry } from "../model/mirror.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
-import type { Seams } from "../model/seams.js";
+import type { Seams } from "lpdeform-client/mesh/seams";
 import { nothing } from "../model/pointed.js";
 import { subtract } from "../model/pose.js";
 import { gridStep } from "../model/snap.js";
 import { State } from "../model/state.js";
+import { short } from "../model/words.js";
 import { symmetric } from "../model/symmetric.js";
 import { firstView, type View } from "../model/view.js";
 import type { Look, Stage } from "../stage/stage.js";
-import { prepare } from "../io/opened.js";
+import { keepOnly, prepare } from "../io/opened.js";
 import { watchedMesh } from "../link/watched.js";
-import { Asides, type Kept } from "./asides.js";
+import { Asides, type Kept, weldingOf } from "./asides.js";
 import { type Facts, firstFacts, noMesh } from "./facts.js";
 import { Pace } from "./pace.js";
 import { Editing } from "./editing.js";
@@ -78,7 +79,10 @@ export class App implements Workbench {
         this.requestDraw();
       },
     );
-    new ResizeObserver(() => this.requestDraw()).observe(this.stages);
+    // Nobody waits for the end of an idle session. A page that the browser sets aside goes on when it comes back.
+    window.addEventListener("pagehide", ({ persisted }) => {
+      if (!persisted) for (const { live } of this.panes) live?.close(true);
+    });
     for (const end of ["keyup", "blur"]) window.addEventListener(end, () => this.#keyUp());
   }
 
@@ -145,33 +149,46 @@ export class App implements Workbench {
     return this.view.now.isWelded ? this.#seams : undefined;
   }
 
-  /** Sets whether vertices along seams move as one. */
-  weld(isWelded: boolean): void {
-    if (!this.#seams) return;
-    this.view.set({ isWelded });
+  /** Sets which vertices along seams move as one. */
+  async weld(welding: Welding): Promise<void> {
+    const { mesh, diagonal } = this;
+    const share = derivedOf(mesh).shortestEdge / diagonal;
+    if (welding.tolerance > usualWelding.tolerance && welding.tolerance >= share) {
+      return this.notify(`The shortest edge has ${short(100 * share)} % of the size: its ends would be one vertex.`, true);
+    }
+    await prepare(mesh, welding);
+    if (this.mesh !== mesh || !isKnown(mesh, welding)) return; // another mesh, or another wish, has come since
+    this.#takeWelding();
     this.facts.set({ report: undefined, problem: undefined });
     this.#openPanes();
   }
 
+  #takeWelding(): void {
+    const { seams, welding } = derivedOf(this.mesh);
+    this.#seams = seams;
+    this.view.set({ isWelded: welding.isOn, weldTolerance: welding.tolerance });
+    this.facts.set({ seamVertices: seams?.copyCount ?? 0 });
+  }
+
   #openPanes(): void {
-    const { mesh, seams } = this;
-    this.adjacency = shownOf(mesh, seams?.faces ?? mesh.faces).adjacency;
-    for (const pane of this.panes) pane.open(mesh, this.document, this.view.now, seams, this.#watched);
+    const { mesh } = this;
+    this.adjacency = derivedOf(mesh).shown.adjacency;
+    for (const pane of this.panes) pane.open(mesh, this.document, this.view.now, this.#watched);
     this.#needsMarks = true;
     this.#documentChanged(performance.now());
   }
 
   /** `isBroughtBack`: the user has worked on it before. */
-  open(mesh: Mesh, document: Document, isBroughtBack = false, isWelded = true): void {
+  open(mesh: Mesh, document: Document, isBroughtBack = false): void {
     this.endAll();
     if (this.isTouched) this.#asides.put(this.#present());
     this.#isBroughtBack = isBroughtBack;
     this.history.reset(document);
-    const { seams, edge, bounds } = derivedOf(mesh);
-    this.#seams = seams;
+    keepOnly(mesh);
+    const { edge, bounds } = derivedOf(mesh);
     this.edge = edge;
     this.diagonal = bounds.diagonal;
-    this.view.set({ selected: undefined, shape: "", pinned: undefined, isWelded });
+    this.view.set({ selected: undefined, shape: "", pinned: undefined });
     this.facts.set({
       mesh,
       report: undefined,
@@ -179,8 +196,8 @@ export class App implements Workbench {
       restoredFrom: undefined,
       pointedOut: nothing,
       setAside: this.#asides.names,
-      seamVertices: this.#seams?.copyCount ?? 0,
     });
+    this.#takeWelding();
     if (this.view.now.colourBy === "texture" && !this.isTextured) this.view.set({ colourBy: "distortion" });
     this.#openPanes();
     this.fit();
@@ -192,16 +209,16 @@ export class App implements Workbench {
    */
   async watch(session: string): Promise<void> {
     const mesh = await watchedMesh(session, (status) => this.facts.set({ status }));
-    await prepare(mesh);
+    await prepare(mesh, usualWelding);
     this.#watched = session;
     this.open(mesh, emptyDocument);
     this.view.set({ isYUp: derivedOf(mesh).isYUp });
   }
 
   #present(): Kept {
-    const { shape, detail, selected, isYUp, pinned, isWelded } = this.view.now;
+    const { shape, detail, selected, isYUp, pinned, isWelded, weldTolerance } = this.view.now;
     const { look } = this.panes[0]!.stage;
-    const view = { shape, detail, selected, isYUp, pinned, isWelded };
+    const view = { shape, detail, selected, isYUp, pinned, isWelded, weldTolerance };
     return { mesh: this.mesh, document: this.document, view, look, steps: this.history.stepsSoFar };
   }
 
@@ -227,18 +244,21 @@ export class App implements Workbench {
   }
 
   /** Restores work that was set aside, with its history. The present work is set aside instead. */
-  bringBack(id: number): void {
+  async bringBack(id: number): Promise<void> {
+    const wanted = this.#asides.find(id);
+    if (wanted) await prepare(wanted.mesh, weldingOf(wanted.view));
     const aside = this.#asides.take(id);
     if (!aside) return;
-    this.open(aside.mesh, aside.document, true, aside.view.isWelded);
+    this.open(aside.mesh, aside.document, true);
     this.#restoreSteps(aside.steps);
     this.view.set({ ...aside.view, tool: "move" });
     this.lookFrom(aside.look);
   }
 
-  /** Opens work that was kept over a reload. */
-  restore({ mesh, document, view, look, steps }: Kept): void {
-    this.open(mesh, document, true, view.isWelded);
+  /** Opens work that was kept over a reload, or in a file. */
+  async restore({ mesh, document, view, look, steps }: Kept): Promise<void> {
+    await prepare(mesh, weldingOf(view));
+    this.open(mesh, document, true);
     this.#restoreSteps(steps);
     this.view.set(view);
     this.lookFrom(look);
@@ -267,7 +287,8 @@ export class App implements Workbench {
 
   /** Whether the file of the mesh has materials that are shown. */
   get isTextured(): boolean {
-    return this.mesh.gltf !== undefined && this.mesh.beside?.includes("materials") === true;
+    const { gltf, materials, beside } = this.mesh;
+    return materials !== undefined || (gltf !== undefined && beside?.includes("materials") === true);
   }
 
   get mirror(): Mirror | undefined {
@@ -293,9 +314,7 @@ export class App implements Workbench {
   setSymmetry(symmetry: Symmetry): void {
     this.view.set({ symmetry });
     if (symmetry === "none") return;
-    const hasPlaces = this.document.handles.some(({ targets }) => targets);
-    const but = hasPlaces ? " But handles whose vertices have places of their own are not mirrored." : "";
-    this.notify(`What is done on one side of the plane across ${symmetry} is done on the other.${but}`);
+    this.notify(`What is done on one side of the plane across ${symmetry} is done on the other.`);
   }
 
   endGesture(): void {
@@ -502,7 +521,7 @@ export class App implements Workbench {
   #addSecondPane(): boolean {
     try {
       const pane = this.#panes.add("second");
-      if (this.mesh !== noMesh) pane.open(this.mesh, this.document, this.view.now, this.seams, this.#watched);
+      if (this.mesh !== noMesh) pane.open(this.mesh, this.document, this.view.now, this.#watched);
       return true;
     } catch {
       this.notify("This browser draws no second picture. Close other pages that draw in three dimensions.", true);
@@ -528,7 +547,7 @@ export class App implements Workbench {
       this.#needsMarks = true;
     }
     if (view.encoding !== before.encoding && this.mesh !== noMesh)
-      for (const pane of this.panes) pane.open(this.mesh, this.document, view, this.seams, this.#watched);
+      for (const pane of this.panes) pane.open(this.mesh, this.document, view, this.#watched);
     if (view.isYUp !== before.isYUp) this.fit();
     this.#needsColours = this.#needsMarks = true;
     this.requestDraw();

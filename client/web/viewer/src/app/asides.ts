@@ -1,6 +1,7 @@
 import type { Document } from "../model/document.js";
 import type { Steps } from "../model/history.js";
-import type { Mesh } from "../model/mesh.js";
+import { usualWelding, type Welding } from "lpdeform-client/mesh/derived";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 import type { View } from "../model/view.js";
 import type { Look } from "../stage/stage.js";
 
@@ -8,10 +9,15 @@ import type { Look } from "../stage/stage.js";
 export interface Kept {
   mesh: Mesh;
   document: Document;
-  view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned" | "isWelded">;
+  view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned" | "isWelded"> & Partial<Pick<View, "weldTolerance">>;
   look: Look;
   /** Work that earlier versions of the page have kept has none. */
   steps?: Steps<Document>;
+}
+
+/** Work that earlier versions of the page have kept has no tolerance. */
+export function weldingOf({ isWelded, weldTolerance }: Partial<Pick<View, "isWelded" | "weldTolerance">>): Welding {
+  return { isOn: isWelded ?? usualWelding.isOn, tolerance: weldTolerance ?? usualWelding.tolerance };
 }
 
 /** A work's entry in the page's list. */
@@ -27,6 +33,10 @@ export class Asides {
 
   put(work: Kept): void {
     this.#all.unshift({ id: ++this.#newest, work, isLetGo: false });
+  }
+
+  find(id: number): Kept | undefined {
+    return this.#all.find((one) => one.id === id)?.work;
   }
 
   /** Takes the work out of the list. */

@@ -1,3 +1,4 @@
+import { derivedOf, weldOf } from "lpdeform-client/mesh/derived";
 import type { LpdeformError } from "lpdeform-client";
 import { sentence } from "../link/status.js";
 import { shapesOf } from "../link/prepare.js";
@@ -72,7 +73,7 @@ export class Blend {
   }
 
   async #prepare(): Promise<void> {
-    const { mesh, document, seams, panes } = this.app;
+    const { mesh, document, panes } = this.app;
     if (panes[0]!.live?.isSettling) {
       this.#timer = setTimeout(() => void this.#prepare(), idleMs);
       return;
@@ -81,7 +82,7 @@ export class Blend {
     try {
       const documents = blendPs.map((p) => ({ ...document, p }));
       let next = 0;
-      for await (const shape of shapesOf(mesh, documents, seams?.groups, signal)) {
+      for await (const shape of shapesOf(mesh, documents, weldOf(derivedOf(mesh)), signal)) {
         if (signal.aborted) return;
         this.#shapes.set(blendPs[next++]!, shape);
         this.facts.set({ ready: this.#shapes.size });

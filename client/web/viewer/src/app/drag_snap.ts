@@ -1,7 +1,7 @@
 import type { Handle } from "../model/document.js";
-import type { Vector3 } from "../model/mesh.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
 import { add, subtract } from "../model/pose.js";
-import { vertexNormals } from "../model/normals.js";
+import { vertexNormals } from "lpdeform-client/mesh/normals";
 import { facing, project } from "../model/selection.js";
 import { gridStep, nearestTo, onGrid } from "../model/snap.js";
 import { type PointerAt, viewProjection } from "../stage/pointing.js";

@@ -1,12 +1,12 @@
 import { addHandle, type Document, extendHandle, type Handle, handleOf, ownersOf, releaseVertices } from "../model/document.js";
-import { isAtRest, type Vector3 } from "../model/mesh.js";
+import { isAtRest, type Vector3 } from "lpdeform-client/mesh/mesh";
 import { partnerOf } from "../model/symmetric.js";
 import { nothing, ofVertices } from "../model/pointed.js";
 import { follow, placesOf } from "../model/places.js";
 import { add, type Pose, subtract } from "../model/pose.js";
 import { boxPolygon, dab, facing, insidePolygon, project } from "../model/selection.js";
 import { posedTogether, selecting, selectionOf, shiftedTogether, toggled } from "../model/together.js";
-import { vertexNormals } from "../model/normals.js";
+import { vertexNormals } from "lpdeform-client/mesh/normals";
 import { onPlane, type PointerAt, Pointing, type PointingTarget, type Stroke, viewProjection } from "../stage/pointing.js";
 import { KeyPointer } from "./key_pointer.js";
 import type { Pane } from "./pane.js";

@@ -1,7 +1,7 @@
 import type { LpdeformError, MeshReport } from "lpdeform-client";
 import { say, type Status } from "../link/status.js";
 import { type Document, emptyDocument } from "../model/document.js";
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { nothing, type PointedOut } from "../model/pointed.js";
 import type { AsideName } from "./asides.js";
 

@@ -1,15 +1,15 @@
-import { FileFault } from "../io/fault.js";
-import { newGlb } from "../io/gltf.js";
+import { FileFault } from "lpdeform-client/mesh/fault";
+import { newGlb } from "../io/write_glb.js";
 import { rewriteGlb } from "../io/gltf_rewrite.js";
 import { readHandleFile, writeHandleFile } from "../io/handlefile.js";
-import { writeObj } from "../io/obj.js";
+import { writeObj } from "../io/write_obj.js";
 import { openedMesh } from "../io/opened.js";
 import { rewriteObj } from "../io/obj_rewrite.js";
-import { writeOff } from "../io/off.js";
-import { writePly } from "../io/ply.js";
+import { writeOff } from "../io/write_off.js";
+import { writePly } from "../io/write_ply.js";
 import { emptyDocument } from "../model/document.js";
-import { derivedOf } from "../model/derived.js";
-import { isAtRest, type Mesh, type WrittenMesh } from "../model/mesh.js";
+import { derivedOf } from "lpdeform-client/mesh/derived";
+import { isAtRest, type Mesh, type WrittenMesh } from "lpdeform-client/mesh/mesh";
 import { short } from "../model/words.js";
 import type { App } from "./app.js";
 import { sentence } from "../link/status.js";
@@ -29,6 +29,7 @@ const largeBytes = 2e6;
 const isHandles = ({ name }: File) => /\.json$/i.test(name);
 const isProject = ({ name }: File) => /\.lpdeform$/i.test(name);
 const isForeign = ({ name }: File) => /\.(fbx|dae|3mf)$/i.test(name);
+const isOfMaterials = ({ name }: File) => /\.(mtl|png|jpe?g|webp|bmp|gif)$/i.test(name);
 const isMesh = (file: File) => /\.(glb|gltf|off|obj|ply|stl)$/i.test(file.name) || isForeign(file);
 
 interface Exported {
@@ -44,7 +45,7 @@ export class Files {
 
   constructor(readonly app: App) {
     this.#input.type = "file";
-    this.#input.accept = ".glb,.gltf,.bin,.off,.obj,.ply,.stl,.fbx,.dae,.3mf,.json,.lpdeform";
+    this.#input.accept = ".glb,.gltf,.bin,.off,.obj,.mtl,.png,.jpg,.jpeg,.webp,.ply,.stl,.fbx,.dae,.3mf,.json,.lpdeform";
     this.#input.multiple = true;
     this.#input.addEventListener("change", () => {
       void this.open([...(this.#input.files ?? [])]);
@@ -58,8 +59,8 @@ export class Files {
   }
 
   /**
-   * Opens a project, or a mesh, handles, or both, in any order. Files beside a mesh, such as materials, are ignored, except those
-   * that a glTF names.
+   * Opens a project, or a mesh, handles, or both, in any order. Files beside a mesh are ignored, except those that a glTF names, and
+   * the MTL and images of an OBJ.
    */
   async open(files: readonly File[]): Promise<void> {
     const meshes = files.filter(isMesh);
@@ -74,8 +75,7 @@ export class Files {
     const known = [...projects, ...meshes, ...files.filter(isHandles)];
     for (const file of known.length > 0 ? known : files) {
       try {
-        const isGltf = /\.gltf$/i.test(file.name);
-        await this.#openFile(file, isGltf ? files.filter((other) => other !== file) : []);
+        await this.#openFile(file, besideOf(file, files));
       } catch (error) {
         const isFault = error instanceof FileFault;
         this.app.notify(isFault ? error.message : `${file.name} cannot be opened: ${(error as Error).message}`, true);
@@ -239,6 +239,13 @@ export class Files {
       void this.open([...(event.dataTransfer?.files ?? [])]);
     });
   }
+}
+
+/** What is read together with the file. */
+function besideOf(file: File, files: readonly File[]): File[] {
+  const others = files.filter((other) => other !== file);
+  if (/\.gltf$/i.test(file.name)) return others;
+  return /\.obj$/i.test(file.name) ? others.filter(isOfMaterials) : [];
 }
 
 /** What a file had that this format cannot hold, in words. */

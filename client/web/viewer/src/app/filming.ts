@@ -1,10 +1,10 @@
 import { LpdeformError } from "lpdeform-client";
 import { morphGlb } from "../io/gltf_morphs.js";
 import { shapesOf } from "../link/prepare.js";
-import { shownOf } from "../model/derived.js";
+import { derivedOf, weldOf } from "lpdeform-client/mesh/derived";
 import type { Shape } from "../model/blend.js";
 import { type Moment, momentsOf, shapeAt } from "../model/film.js";
-import { DrawMesh } from "../stage/drawmesh.js";
+import { drawnAt } from "lpdeform-client/mesh/drawmesh";
 import type { App } from "./app.js";
 import { secondsEach } from "./player.js";
 
@@ -27,8 +27,8 @@ export interface Film {
  * Solves for the poses and for what is between them, in a session of its own. Undefined if there are no two poses, which the user is
  * told, or if the work changes meanwhile. Rejects with an LpdeformError.
  */
-async function film(app: App): Promise<Film | undefined> {
-  const { mesh, document, seams } = app;
+async function film(app: App, signal: AbortSignal): Promise<Film | undefined> {
+  const { mesh, document } = app;
   const poses = document.keyPoses?.length ?? 0;
   if (poses < 2) {
     app.notify("There is nothing to film before there are two poses: “Keep this pose” in the panel “Poses”.", true);
@@ -40,22 +40,30 @@ async function film(app: App): Promise<Film | undefined> {
   const shapes: Shape[] = [];
   const say = () => app.notifyWhile(`Solving for the poses: ${shapes.length + 1} of ${moments.length}… Escape stops it.`);
   let done = say();
-  const over = new AbortController();
-  const stop = ({ code }: KeyboardEvent) => {
-    if (code === "Escape") over.abort(new LpdeformError("cancelled", "Escape was pressed."));
-  };
-  window.addEventListener("keydown", stop);
   try {
     const documents = moments.map((moment) => moment.document);
-    for await (const shape of shapesOf(mesh, documents, seams?.groups, over.signal)) {
+    for await (const shape of shapesOf(mesh, documents, weldOf(derivedOf(mesh)), signal)) {
       if (isAnother()) break;
       shapes.push(shape);
       if (shapes.length < moments.length) done = say();
     }
     return isAnother() ? sayChanged(app) : { moments, shapes, seconds: secondsEach * (poses - 1) };
   } finally {
-    window.removeEventListener("keydown", stop);
     done();
+  }
+}
+
+/** Aborts when Escape is pressed, for as long as the work goes on. */
+async function untilEscape<Made>(work: (signal: AbortSignal) => Promise<Made>): Promise<Made> {
+  const over = new AbortController();
+  const stop = ({ code }: KeyboardEvent) => {
+    if (code === "Escape") over.abort(new LpdeformError("cancelled", "Escape was pressed."));
+  };
+  window.addEventListener("keydown", stop);
+  try {
+    return await work(over.signal);
+  } finally {
+    window.removeEventListener("keydown", stop);
   }
 }
 
@@ -63,36 +71,39 @@ function sayChanged(app: App): undefined {
   app.notify("The work has changed: the poses were not exported.", true);
 }
 
-/** The poses as a GLB with morph targets and an animation through them, shaded as on the page. */
+/** The poses as a GLB with morph targets and an animation through them, shaded as on the page. Rejects after Escape, too. */
 export async function posesAsGlb(app: App): Promise<Uint8Array<ArrayBuffer> | undefined> {
-  const { mesh, seams } = app;
-  const made = await film(app);
+  const { mesh } = app;
+  const made = await untilEscape((signal) => film(app, signal));
   if (!made) return undefined;
   const { moments, shapes, seconds } = made;
-  const faces = seams?.faces ?? mesh.faces;
-  const draw = new DrawMesh({ positions: mesh.positions, faces }, shownOf(mesh, faces).drawn);
-  const stills = shapes.map(({ positions }, k) => {
-    draw.take(positions);
-    return { name: moments[k]!.name, positions: draw.positions.slice(), normals: draw.normals.slice() };
-  });
-  return morphGlb(mesh.name, draw.indices, stills, seconds / (stills.length - 1));
+  const { drawn } = derivedOf(mesh).shown;
+  const stills = shapes.map(({ positions }, k) => ({ name: moments[k]!.name, ...drawnAt(positions, drawn) }));
+  return morphGlb(mesh.name, drawn.indices, stills, seconds / (stills.length - 1));
 }
 
-/** The poses as a video of the first picture, as it looks. Undefined if this browser records none, or as film(). */
-export async function posesAsVideo(app: App): Promise<Blob | undefined> {
+/**
+ * The poses as a video of the first picture, as it looks. Undefined if this browser records none, or as film(). Rejects after Escape,
+ * too.
+ */
+export function posesAsVideo(app: App): Promise<Blob | undefined> {
+  return untilEscape((signal) => filmed(app, signal));
+}
+
+async function filmed(app: App, signal: AbortSignal): Promise<Blob | undefined> {
   const mimeType = formats.find((format) => globalThis.MediaRecorder?.isTypeSupported(format));
   if (!mimeType) {
     app.notify("This browser records no videos.", true);
     return undefined;
   }
-  const made = await film(app);
+  const made = await film(app, signal);
   if (!made) return undefined;
   const { mesh } = app;
   const { selected, alsoSelected } = app.view.now;
-  const done = app.notifyWhile("Recording the poses…");
+  const done = app.notifyWhile("Recording the poses… Escape stops it.");
   app.view.set({ selected: undefined });
   try {
-    const video = await recorded(app, made, mimeType);
+    const video = await recorded(app, made, mimeType, signal);
     return app.mesh === mesh ? video : sayChanged(app);
   } finally {
     done();
@@ -104,7 +115,7 @@ export async function posesAsVideo(app: App): Promise<Blob | undefined> {
 /**
  * Shows the shapes one after the other, and records a copy of each picture: the size of the stage's own changes if drawing is slow.
  */
-async function recorded(app: App, { shapes, seconds }: Film, mimeType: string): Promise<Blob> {
+async function recorded(app: App, { shapes, seconds }: Film, mimeType: string, signal: AbortSignal): Promise<Blob> {
   const { stage } = app.panes[0]!;
   const canvas = document.createElement("canvas");
   const ratio = Math.min(devicePixelRatio, 2);
@@ -124,11 +135,12 @@ async function recorded(app: App, { shapes, seconds }: Film, mimeType: string): 
     app.preview(shapes[0]!);
     await nextPicture(app);
     recorder.start();
-    await play(app, shapes, seconds);
+    await play(app, shapes, seconds, signal);
     recorder.stop();
     await stopped;
   } finally {
     app.afterDrawing.delete(copy);
+    if (recorder.state !== "inactive") recorder.stop();
     for (const track of stream.getTracks()) track.stop();
   }
   return new Blob(parts, { type: mimeType });
@@ -144,12 +156,13 @@ function nextPicture(app: App): Promise<void> {
   });
 }
 
-/** With pictures at rest before and after. Ends early if another mesh is opened. */
-function play(app: App, shapes: readonly Shape[], seconds: number): Promise<void> {
+/** With pictures at rest before and after. Ends early if another mesh is opened. Rejects with the signal's reason. */
+function play(app: App, shapes: readonly Shape[], seconds: number, signal: AbortSignal): Promise<void> {
   const { mesh } = app;
   const begin = performance.now();
-  return new Promise((resolve) => {
+  return new Promise((resolve, reject) => {
     const step = (now: number) => {
+      if (signal.aborted) return reject(signal.reason as LpdeformError);
       const at = (now - begin) / 1000 - restSeconds;
       if (at > seconds + restSeconds || app.mesh !== mesh) return resolve();
       app.preview(shapeAt(shapes, (at / seconds) * (shapes.length - 1)));

@@ -1,11 +1,12 @@
 import { forget, remember, remembered } from "../io/remember.js";
-import { prepare } from "../io/opened.js";
+import { openedStored, storedOf } from "../io/opened.js";
+import { restored, type StoredMesh } from "lpdeform-client/mesh/stored";
 import { type AsideWork, Store, type Work } from "../io/store.js";
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { stepsToKeep } from "../model/kept_steps.js";
 import type { View } from "../model/view.js";
 import type { App } from "./app.js";
-import type { Kept } from "./asides.js";
+import { type Kept, weldingOf } from "./asides.js";
 import { claim, whileFree } from "./claim.js";
 
 /** When the user wants to see work again at which the page stopped last time. */
@@ -52,15 +53,14 @@ export class Keeper {
     try {
       const store = await within(Store.open(), patienceMs);
       const work = await this.#claimWork(store);
-      const mesh = work && (await store.mesh(work.meshKey));
+      const kept = work && (await store.mesh(work.meshKey));
       this.#store = store;
-      if (!work || !mesh) return false;
-      const when = remembered(restoringKey(work.id)) ? await this.wantsBack(mesh.name) : "now";
+      if (!work || !kept) return false;
+      const when = remembered(restoringKey(work.id)) ? await this.wantsBack(nameOf(kept)) : "now";
       if (when === "never") forget(restoringKey(work.id));
       if (when === "later") await this.#putOff();
       if (when !== "now") return false;
-      await prepare(mesh);
-      this.#show(work, mesh);
+      await this.#show(work, "blob" in kept ? await openedStored(kept, weldingOf(work.view)) : kept);
       await this.#showAsides(store, work);
       return true;
     } catch {
@@ -86,9 +86,9 @@ export class Keeper {
       if (camera !== this.#camera) this.#soon();
       this.#camera = camera;
     });
-    const now = () => this.#timer !== undefined && void this.#save();
-    window.addEventListener("pagehide", now);
-    document.addEventListener("visibilitychange", now);
+    const now = (isLeaving: boolean) => this.#timer !== undefined && void this.#save(isLeaving);
+    window.addEventListener("pagehide", () => now(true));
+    document.addEventListener("visibilitychange", () => now(false));
   }
 
   /** The work of this tab, of this tab before the reload, or of a closed tab. */
@@ -132,14 +132,14 @@ export class Keeper {
     }
   }
 
-  #show({ document, view, camera, savedAt, meshKey, steps }: Work, mesh: Mesh): void {
+  async #show({ document, view, camera, savedAt, meshKey, steps }: Work, mesh: Mesh): Promise<void> {
     const { app } = this;
     const { selected, pinned, shape, ...look } = view;
     this.#watchOver();
     app.view.set(look);
-    const { detail, isYUp, isWelded } = { ...app.view.now, ...look };
-    const kept = { selected, pinned, shape: shape ?? "", detail, isYUp, isWelded };
-    app.restore({ mesh, document, view: kept, look: camera, ...(steps && { steps }) });
+    const { detail, isYUp, isWelded, weldTolerance } = { ...app.view.now, ...look };
+    const kept = { selected, pinned, shape: shape ?? "", detail, isYUp, isWelded, weldTolerance };
+    await app.restore({ mesh, document, view: kept, look: camera, ...(steps && { steps }) });
     app.facts.set({ restoredFrom: savedAt });
     this.#kept.set(mesh, meshKey);
     this.isKeeping = true;
@@ -148,8 +148,9 @@ export class Keeper {
   async #showAsides(store: Store, { asides = [] }: Work): Promise<void> {
     const works: Kept[] = [];
     for (const { meshKey, document, view, camera, steps } of asides) {
-      const mesh = await store.mesh(meshKey);
-      if (!mesh) continue;
+      const stored = await store.mesh(meshKey);
+      if (!stored) continue;
+      const mesh = "blob" in stored ? await restored(stored) : stored;
       works.push({ mesh, document, view, look: camera, ...(steps && { steps }) });
       this.#kept.set(mesh, meshKey);
     }
@@ -174,7 +175,8 @@ export class Keeper {
     this.#timer ??= setTimeout(() => void this.#save(), saveEveryMs);
   }
 
-  async #save(): Promise<void> {
+  /** `isLeaving`: there is no time for a worker's answer. */
+  async #save(isLeaving = false): Promise<void> {
     clearTimeout(this.#timer);
     this.#timer = undefined;
     const { isDark: _, hasSingleKeys: __, ...view }: View = this.app.view.now;
@@ -195,7 +197,10 @@ export class Keeper {
           meshKey,
           ...(steps && { steps }),
         } as const;
-        const newMeshes = [...keys].filter(([mesh]) => !this.#kept.has(mesh));
+        const isNew = [...keys].filter(([mesh]) => !this.#kept.has(mesh));
+        const newMeshes = isLeaving
+          ? isNew
+          : await Promise.all(isNew.map(async ([mesh, key]) => [await storedOf(mesh), key] as const));
         await this.#store!.put({ ...work, view: { ...view, ...kept.view }, asides: asides.map(withoutMesh) }, newMeshes);
         if (this.#hasPutOff) {
           sessionStorage.setItem(key, this.#id);
@@ -211,6 +216,10 @@ export class Keeper {
       this.#kept.clear(); // full, or forbidden: the page asks before it is left
     }
   }
+}
+
+function nameOf(kept: Mesh | StoredMesh): string {
+  return "blob" in kept ? (kept.rest.name ?? "") : kept.name;
 }
 
 function withoutMesh({ document, steps, view, camera, meshKey }: AsideWork): AsideWork {

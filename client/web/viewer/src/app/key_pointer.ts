@@ -1,4 +1,4 @@
-import { boundsOf } from "../model/mesh.js";
+import { boundsOf } from "lpdeform-client/mesh/mesh";
 import { project } from "../model/selection.js";
 import { viewProjection } from "../stage/pointing.js";
 import type { Pane } from "./pane.js";

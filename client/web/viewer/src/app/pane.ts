@@ -1,4 +1,5 @@
-import type { Frame, LpdeformError, MeshReport } from "lpdeform-client";
+import type { EnergyStatistics, Frame, LpdeformError, MeshReport } from "lpdeform-client";
+import { derivedOf, weldOf } from "lpdeform-client/mesh/derived";
 import { Live, type LiveWatcher } from "../link/live.js";
 import { say, type Status } from "../link/status.js";
 import type { Shape } from "../model/blend.js";
@@ -6,16 +7,16 @@ import type { Side } from "../model/changes.js";
 import { Matrix4 } from "three";
 import { type Ahead, aheadOf } from "../model/ahead.js";
 import { type Document, pField } from "../model/document.js";
-import { boundsOf, centroid, type Mesh } from "../model/mesh.js";
+import { boundsOf, centroid, type Mesh } from "lpdeform-client/mesh/mesh";
 import { Progress } from "../model/progress.js";
-import { pullOf } from "../model/pull.js";
+import { pullOf } from "lpdeform-client/mesh/pull";
 import { cornersOf, type PointedOut } from "../model/pointed.js";
-import type { Seams } from "../model/seams.js";
-import { type EnergyStatistics, energyStatistics } from "../model/statistics.js";
+import { energyStatistics } from "lpdeform-client/mesh/statistics";
 import { selectionOf } from "../model/together.js";
 import type { View } from "../model/view.js";
-import { vertexNormals } from "../model/normals.js";
-import { type Intake, IntakeWorker } from "../stage/intake.js";
+import { vertexNormals } from "lpdeform-client/mesh/normals";
+import { type MeshWorker, workerOf } from "../io/opened.js";
+import type { Shaded } from "lpdeform-client";
 import { Overlay } from "../stage/overlay.js";
 import { Stage } from "../stage/stage.js";
 import { motionBetween } from "../stage/ahead.js";
@@ -54,9 +55,9 @@ export class Pane {
   frame: Frame | undefined;
   statistics = nothing;
   #isDirty = true;
-  #intakeWorker: IntakeWorker | undefined;
-  /** What is drawn of frames that are not drawn yet. */
-  #intakes = new WeakMap<Frame, Intake>();
+  /** Of the element, in CSS pixels. */
+  #size: [number, number] = [0, 0];
+  #worker: MeshWorker | undefined;
   #onScreenNext: Frame | undefined;
   #pull: Pull | undefined;
   /** Shown in place of the frames. */
@@ -74,21 +75,24 @@ export class Pane {
       watcher.changed();
     });
     this.element.append(this.stage.canvas, this.overlay.element);
+    const resized = new ResizeObserver(() => {
+      this.#measure();
+      watcher.changed();
+    });
+    resized.observe(this.element);
+    this.over.signal.addEventListener("abort", () => resized.disconnect());
   }
 
   /** `watched`: somebody else's session of the mesh. */
-  open(mesh: Mesh, document: Document, view: View, seams: Seams | undefined, watched?: string): void {
+  open(mesh: Mesh, document: Document, view: View, watched?: string): void {
     this.live?.close();
-    this.#intakeWorker?.stop();
-    this.stage.open(mesh, seams?.faces);
-    this.#intakeWorker = IntakeWorker.start(this.stage.surface!.intakeMesh);
+    this.stage.open(mesh);
+    this.#worker = workerOf(mesh);
     this.frame = this.#onScreenNext = this.#pull = this.#preview = undefined;
     this.statistics = nothing;
     this.trail.reset();
     this.progress.reset();
-    const worker = this.#intakeWorker;
     const watcher: LiveWatcher = {
-      prepare: worker && ((frame) => this.#prepare(worker, frame)),
       frame: () => this.watcher.changed(),
       status: (status) => this.watcher.status(status),
       report: (report) => this.watcher.report(report),
@@ -96,22 +100,22 @@ export class Pane {
       notice: (text) => this.watcher.notice(text),
       better: () => this.watcher.better(),
     };
-    this.live = new Live(mesh, document, this.side, view.encoding, watcher, seams?.groups, watched);
+    this.live = new Live(mesh, document, this.side, view.encoding, watcher, weldOf(derivedOf(mesh)), watched, this.#worker);
     this.watcher.better();
     this.#isDirty = true;
-  }
-
-  async #prepare(worker: IntakeWorker, frame: Frame): Promise<void> {
-    const intake = await worker.take(frame);
-    if (intake) this.#intakes.set(frame, intake);
   }
 
   get status(): Status {
     return this.live?.status ?? say("idle", "");
   }
 
+  /** Undefined at rest, before the first frame. */
+  get #distortion(): Float32Array | undefined {
+    return (this.#preview ?? this.frame)?.distortion;
+  }
+
   get distortion(): Float32Array {
-    return (this.#preview ?? this.frame)?.distortion ?? new Float32Array((this.stage.surface?.mesh.positions.length ?? 0) / 3);
+    return this.#distortion ?? new Float32Array((this.stage.surface?.mesh.positions.length ?? 0) / 3);
   }
 
   /** Takes the newest frame if there is one. Returns true if the surface has changed. */
@@ -125,7 +129,7 @@ export class Pane {
     }
     this.frame = this.#onScreenNext = frame;
     if (this.#endsWithFrame) this.#preview = undefined;
-    if (!this.#preview) this.#move(frame.positions, this.#intakes.get(frame));
+    if (!this.#preview) this.#move(frame.positions, frame.shaded);
     this.trail.add(frame.iteration, frame.energy ** (1 / this.live!.exponentOf(frame)));
     this.progress.add(frame);
     this.#isDirty = true;
@@ -154,10 +158,11 @@ export class Pane {
     this.#pull = pull;
     this.#showPull(surface, undefined);
     const { positions } = surface.mesh;
-    if (!this.#intakeWorker) return this.#showPull(surface, pullOf(positions, surface.adjacency, pulled, held));
-    void this.#intakeWorker.pull({ pulled, held }).then((shares) => {
+    if (!this.#worker) return this.#showPull(surface, pullOf(positions, surface.adjacency, pulled, held));
+    const show = (shares: Float32Array) => {
       if (this.#pull === pull && this.stage.surface === surface) this.#showPull(surface, shares);
-    });
+    };
+    this.#worker.pull({ pulled, held }).then(show, () => undefined); // the mesh was closed
   }
 
   #showPull(surface: Surface, shares: Float32Array | undefined): void {
@@ -182,11 +187,11 @@ export class Pane {
     if (this.stage.surface) this.#move(this.frame?.positions ?? this.stage.surface.mesh.positions);
   }
 
-  #move(positions: Float32Array, intake?: Intake): void {
-    this.stage.surface!.move(positions, intake);
+  #move(positions: Float32Array, shaded?: Shaded): void {
+    this.stage.surface!.move(positions, shaded);
     this.stage.marks.move(positions);
     this.stage.highlight.move(positions);
-    this.statistics = intake?.statistics ?? energyStatistics(this.distortion);
+    this.statistics = shaded?.statistics ?? energyStatistics(this.distortion);
     this.#isDirty = true;
   }
 
@@ -195,7 +200,8 @@ export class Pane {
     if (!surface) return;
     if (view.colourBy === "texture") void this.#dress(surface);
     const p = this.side === "first" ? document.p : document.secondP;
-    const [values, scale] = coloured(document, view, p, this.distortion, red);
+    const count = surface.mesh.positions.length / 3;
+    const [values, scale] = coloured(document, view, p, this.#distortion, red, count);
     surface.colour(view.colourBy, values, scale);
     surface.show(view);
     this.stage.darken(view.isDark);
@@ -205,19 +211,21 @@ export class Pane {
 
   /** Once, when its texture is first wanted. */
   async #dress(surface: Surface): Promise<void> {
-    const { name, gltf } = surface.mesh;
-    if (this.#dressed === surface || !gltf) return;
+    const { name, gltf, obj, materials } = surface.mesh;
+    if (this.#dressed === surface || !(gltf || (obj && materials))) return;
     this.#dressed = surface;
     try {
-      const [{ readGltfTextures }, { closeAll, decoded, Textured }] = await Promise.all([
-        import("../io/gltf_textures.js"),
-        import("../stage/textured.js"),
-      ]);
-      const texturing = readGltfTextures(name, gltf);
+      const { closeAll, decoded, Textured } = await import("../stage/textured.js");
+      const texturing = gltf
+        ? (await import("../io/gltf_textures.js")).readGltfTextures(name, gltf)
+        : await (await import("../io/obj_textures.js")).readObjTextures(obj!, materials!);
       const images = await decoded(texturing.layers);
       if (this.stage.surface !== surface) return closeAll(images);
-      const missing = new Set(texturing.layers.map(({ image }, k) => (images[k] ? undefined : image)).filter(Boolean)).size;
-      if (missing > 0) this.watcher.notice(`${missing} textures of ${name} are images that this browser does not show.`);
+      const unknown = new Set(texturing.layers.map(({ image }, k) => (images[k] ? undefined : image)).filter(Boolean)).size;
+      if (unknown > 0) this.watcher.notice(`${unknown} textures of ${name} are images that this browser does not show.`);
+      const { missing = [] } = texturing;
+      if (missing.length > 0)
+        this.watcher.notice(`Open these images together with ${name} to see them: ${missing.join(", ")}.`);
       surface.dress((indices, makeMaterial) => new Textured({ indices }, texturing, images, makeMaterial));
       this.watcher.dressed();
     } catch (thrown) {
@@ -243,6 +251,7 @@ export class Pane {
   fit(isYUp: boolean): void {
     const { surface } = this.stage;
     if (!surface) return;
+    this.#measure();
     this.#resize(true, 1);
     this.stage.fit(surface, isYUp);
   }
@@ -260,9 +269,15 @@ export class Pane {
     this.stage.lookAt(place, centroid(normals, vertices), [Math.max(6 * radius, 1.6 * diagonal), 3 * diagonal]);
   }
 
-  #resize(isMoving: boolean, quality: number): void {
+  /** The browser lays the page out for it. */
+  #measure(): void {
     const { clientWidth, clientHeight } = this.element;
-    if (this.stage.resize(clientWidth, clientHeight, isMoving, quality)) this.#isDirty = true;
+    this.#size = [clientWidth, clientHeight];
+  }
+
+  #resize(isMoving: boolean, quality: number): void {
+    const [width, height] = this.#size;
+    if (this.stage.resize(width, height, isMoving, quality)) this.#isDirty = true;
   }
 
   /** Draws what has changed, or everything finely for a picture at rest. Returns true if anything was drawn. */
@@ -277,8 +292,8 @@ export class Pane {
 
   /** If only the page's layout has changed. */
   #resizeToPage(): void {
-    const { clientWidth, clientHeight } = this.element;
-    if (clientWidth !== this.stage.width || clientHeight !== this.stage.height) this.#resize(true, 1);
+    const [width, height] = this.#size;
+    if (width !== this.stage.width || height !== this.stage.height) this.#resize(true, 1);
   }
 
   /**
@@ -302,7 +317,6 @@ export class Pane {
   close(): void {
     this.over.abort();
     this.live?.close();
-    this.#intakeWorker?.stop();
     this.stage.dispose();
     this.element.remove();
   }
@@ -312,13 +326,13 @@ function coloured(
   document: Document,
   view: View,
   p: number,
-  distortion: Float32Array,
+  distortion: Float32Array | undefined,
   red: number,
-): [Float32Array | undefined, Scale] {
-  const count = distortion.length;
+  count: number,
+): [Float32Array | 0 | undefined, Scale] {
   switch (view.colourBy) {
     case "distortion":
-      return [distortion, { low: 0, red, isLogarithmic: false }];
+      return [distortion ?? 0, { low: 0, red, isLogarithmic: false }];
     case "p":
       return [pField(document, p) ?? new Float32Array(count).fill(p), { low: 1, red: 10, isLogarithmic: true }];
     case "stiffness":

@@ -1,4 +1,6 @@
 import { type Project, readProject, writeProject } from "../io/project.js";
+import { prepare } from "../io/opened.js";
+import { weldingOf } from "./asides.js";
 import type { App } from "./app.js";
 
 /** The present work as a file. */
@@ -9,12 +11,13 @@ export function saveProject(app: App): Promise<Uint8Array<ArrayBuffer>> {
 
 /** Opens a project in place of the present work, which is set aside. If the file has a fault, nothing changes: FileFault. */
 export async function openProject(app: App, name: string, bytes: Uint8Array<ArrayBuffer>): Promise<void> {
-  show(app, await readProject(name, bytes));
+  await show(app, await readProject(name, bytes));
 }
 
-function show(app: App, { mesh, document, view, look }: Project): void {
-  const { shape, detail, selected, isYUp, pinned, isWelded, ...settings } = view;
+async function show(app: App, { mesh, document, view, look }: Project): Promise<void> {
+  const { shape, detail, selected, isYUp, pinned, isWelded, weldTolerance, ...settings } = view;
+  await prepare(mesh, weldingOf(view)); // what follows happens at once
   app.endAll();
   app.view.set({ ...settings, isYUp }); // before the camera is set, because that depends on what is up
-  app.restore({ mesh, document, look, view: { shape, detail, selected, isYUp, pinned, isWelded } });
+  await app.restore({ mesh, document, look, view: { shape, detail, selected, isYUp, pinned, isWelded, weldTolerance } });
 }

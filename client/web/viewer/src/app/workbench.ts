@@ -1,8 +1,8 @@
-import type { Adjacency } from "../model/adjacency.js";
+import type { Adjacency } from "lpdeform-client/mesh/adjacency";
 import type { Document, Handle } from "../model/document.js";
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 import type { Mirror } from "../model/mirror.js";
-import type { Seams } from "../model/seams.js";
+import type { Seams } from "lpdeform-client/mesh/seams";
 import type { State } from "../model/state.js";
 import type { View } from "../model/view.js";
 import type { Facts } from "./facts.js";

@@ -1,5 +1,5 @@
 import { LoadingManager, type Material, Mesh, MeshStandardMaterial, type MeshPhongMaterial, type Object3D } from "three";
-import { FileFault } from "./fault.js";
+import { FileFault } from "lpdeform-client/mesh/fault";
 import { checkUnpackedFbx, checkUnpackedZip } from "./unpacked.js";
 
 // FBX, COLLADA and 3MF, as three.js reads them. They become a GLB, which is opened as any other, with names, colours, texture

@@ -1,6 +1,6 @@
-import { float } from "./gltf_accessors.js";
-import { boundsOf } from "./gltf.js";
-import { type Part, writeGlb } from "./gltf_document.js";
+import { float } from "lpdeform-client/mesh/gltf_accessors";
+import { boundsOf } from "./write_glb.js";
+import { type Part, writeGlb } from "lpdeform-client/mesh/gltf_document";
 
 /** A surface at one moment of a film. */
 export interface Still {

@@ -1,6 +1,6 @@
-import { float, type Layout, layoutOf } from "./gltf_accessors.js";
-import type { Block } from "./gltf_blocks.js";
-import { type GltfDocument, listOf, type Part, partOf } from "./gltf_document.js";
+import { float, type Layout, layoutOf } from "lpdeform-client/mesh/gltf_accessors";
+import type { Block } from "lpdeform-client/mesh/gltf_blocks";
+import { type GltfDocument, listOf, type Part, partOf } from "lpdeform-client/mesh/gltf_document";
 
 const changed = ["POSITION", "NORMAL", "TANGENT"];
 const accessorKeys = ["indices", "inverseBindMatrices", "input", "output", "accessor"];

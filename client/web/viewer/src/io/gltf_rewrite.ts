@@ -1,9 +1,10 @@
+import { usualWelding } from "lpdeform-client/mesh/derived";
 import { Matrix3, Matrix4, Vector3 } from "three";
-import type { Mesh } from "../model/mesh.js";
-import { seamsOf } from "../model/seams.js";
-import { boundsOf } from "./gltf.js";
-import { float, layoutOf, readNumbers } from "./gltf_accessors.js";
-import { type Block, readBlocks } from "./gltf_blocks.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
+import { seamsOf } from "lpdeform-client/mesh/seams";
+import { boundsOf } from "./write_glb.js";
+import { float, layoutOf, readNumbers } from "lpdeform-client/mesh/gltf_accessors";
+import { type Block, readBlocks } from "lpdeform-client/mesh/gltf_blocks";
 import {
   appendView,
   type GltfDocument,
@@ -13,7 +14,7 @@ import {
   readGltfDocument,
   viewOf,
   writeGlb,
-} from "./gltf_document.js";
+} from "lpdeform-client/mesh/gltf_document";
 import { Places } from "./gltf_places.js";
 import { type Numbers, NormalTurner } from "./turned_normals.js";
 
@@ -64,7 +65,7 @@ class Rewriter {
       if (!accessorsOf(block).some((accessor) => touched.has(accessor))) continue;
       this.#put(block, "POSITION", block.position, this.#newPositions(block), 3);
       const { normal, tangent } = block;
-      const toWorld = new Matrix3().setFromMatrix4(block.placement);
+      const toWorld = new Matrix3().setFromMatrix4(matrixOf(block));
       const toNormal = toWorld.clone().invert().transpose();
       if (normal !== undefined) this.#put(block, "NORMAL", normal, this.#turned(block, normal, 3, toNormal), 3);
       if (tangent !== undefined) this.#put(block, "TANGENT", tangent, this.#turned(block, tangent, 4, toWorld), 4);
@@ -82,7 +83,7 @@ class Rewriter {
     const all = new Float64Array(this.#rest.length);
     const normal = new Vector3();
     for (const block of this.#blocks.filter((one) => one.normal !== undefined)) {
-      const toWorld = new Matrix3().getNormalMatrix(block.placement);
+      const toWorld = new Matrix3().getNormalMatrix(matrixOf(block));
       const local = readNumbers(this.#source, block.normal!, 3);
       for (let k = 0; k < local.length; k += 3) {
         normal.fromArray(local, k).applyMatrix3(toWorld).normalize();
@@ -92,9 +93,10 @@ class Rewriter {
     return all;
   }
 
-  #newPositions({ position, first, placement }: Block): Float32Array {
+  #newPositions(block: Block): Float32Array {
+    const { position, first } = block;
     const values = Float32Array.from(readNumbers(this.#source, position, 3));
-    const toLocal = new Matrix4().copy(placement).invert();
+    const toLocal = matrixOf(block).invert();
     const place = new Vector3();
     for (let k = 0; k < values.length; k += 3) {
       const at = 3 * first + k;
@@ -173,7 +175,7 @@ function setBounds(accessor: Part, key: string, values: Float32Array, width: num
  * a seam turn alike, and each side of a hard edge follows its own faces.
  */
 function smoothGroups(mesh: Mesh, normals: Float64Array): Uint32Array {
-  const places = seamsOf(mesh)?.groups;
+  const places = seamsOf(mesh, usualWelding.tolerance)?.groups;
   const known = new Map<number, number[]>();
   const isSame = (a: number, b: number) => {
     const cosine = [0, 1, 2].reduce((sum, axis) => sum + normals[3 * a + axis]! * normals[3 * b + axis]!, 0);
@@ -188,4 +190,8 @@ function smoothGroups(mesh: Mesh, normals: Float64Array): Uint32Array {
     known.set(places[vertex]!, [...here, vertex]);
     return vertex;
   });
+}
+
+function matrixOf({ placement }: Block): Matrix4 {
+  return new Matrix4().fromArray(placement);
 }

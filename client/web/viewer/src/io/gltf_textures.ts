@@ -1,7 +1,16 @@
 import type { Texturing, TextureLayer } from "../model/texturing.js";
-import { readNumbers } from "./gltf_accessors.js";
-import { type Block, type DrawPart, readBlocks } from "./gltf_blocks.js";
-import { bytesAt, type GltfDocument, indexOf, listOf, nameOf, type Part, partOf, readGltfDocument } from "./gltf_document.js";
+import { readNumbers } from "lpdeform-client/mesh/gltf_accessors";
+import { type Block, type DrawPart, readBlocks } from "lpdeform-client/mesh/gltf_blocks";
+import {
+  bytesAt,
+  type GltfDocument,
+  indexOf,
+  listOf,
+  nameOf,
+  type Part,
+  partOf,
+  readGltfDocument,
+} from "lpdeform-client/mesh/gltf_document";
 
 const clampToEdge = 33071;
 

@@ -1,11 +1,11 @@
 import type { Hold, SurfacePoint } from "lpdeform-client";
 import { addHandle, type Document, type Handle, paint, withoutPaint } from "../model/document.js";
 import { type HoldKind, holdKinds, kindOf } from "../model/hold_kinds.js";
-import { centroid, type Mesh, type Vector3 } from "../model/mesh.js";
+import { centroid, type Mesh, type Vector3 } from "lpdeform-client/mesh/mesh";
 import { targetsOf } from "../model/targets.js";
 import { capital } from "../model/words.js";
 import { axisAngle, isAtRest, noRotation, type Pose, quaternionOf } from "../model/pose.js";
-import { FileFault } from "./fault.js";
+import { FileFault } from "lpdeform-client/mesh/fault";
 import { arrayOf, checkKeys, objectOf, textOf, vector3, vertexNumbers, weightOf } from "./json.js";
 
 // The handle file of the command line; client/cli/README.md describes it whole.

@@ -1,5 +1,5 @@
-import type { Vector3 } from "../model/mesh.js";
-import { FileFault } from "./fault.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
+import { FileFault } from "lpdeform-client/mesh/fault";
 
 // Values of a JSON file, or a FileFault that names `what`.
 

@@ -1,5 +1,5 @@
-import type { Mesh } from "../model/mesh.js";
-import { cornerOf, indexOf, logicalLines } from "./obj_lines.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
+import { cornerOf, indexOf, logicalLines } from "lpdeform-client/mesh/obj_lines";
 import { type Numbers, NormalTurner } from "./turned_normals.js";
 
 /**

@@ -1,70 +1,75 @@
-import { type Derived, derivedOf, know } from "../model/derived.js";
-import type { Mesh } from "../model/mesh.js";
-import { Seams } from "../model/seams.js";
-import { FileFault } from "./fault.js";
-import { readMesh } from "./read.js";
+import type { FrameShading } from "lpdeform-client";
+import { OpenMesh, type Welding } from "lpdeform-client/mesh";
+import { derivedOf, isKnown, usualWelding } from "lpdeform-client/mesh/derived";
+import type { PullRequest, Source } from "lpdeform-client/mesh/desk";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
+import type { StoredMesh } from "lpdeform-client/mesh/stored";
 
-/** What a worker is asked to do: to read a file, or to find what is derived of a mesh. */
-export type Asked = { file: File; beside: readonly File[] } | { mesh: Mesh };
-/** What it answers: the mesh, which it has read, and what is derived of it, without classes. Or why it cannot. */
-export type Answer =
-  | { mesh: Mesh | undefined; derived: Omit<Derived, "seams"> & { seams: Pick<Seams, "groups" | "faces"> | undefined } }
-  | { fault: string }
-  | { error: string };
+/** From this number of vertices on, a page is busy for more than some milliseconds with a frame. */
+const largeVertices = 20_000;
 
-/** Below this size the page is as quick by itself. */
-const smallBytes = 200_000;
+/** The workers of meshes; the page has one for the mesh that it shows, and for one that is about to be shown. */
+const all = new Map<Mesh, Promise<OpenMesh>>();
 
-/**
- * Reads a mesh file and finds what is needed to show it; for a large one in a worker. `beside`: files that were opened with it.
- * Rejects with a FileFault.
- */
-export async function openedMesh(file: File, beside: readonly File[]): Promise<Mesh> {
-  const isLarge = [file, ...beside].some(({ size }) => size > smallBytes);
-  const answer = isLarge ? await askWorker({ file, beside }) : undefined;
-  if (answer?.mesh) {
-    know(answer.mesh, withClasses(answer));
-    return answer.mesh;
+/** What a page wants of a mesh's worker. */
+export interface MeshWorker extends FrameShading {
+  pull(request: PullRequest): Promise<Float32Array>;
+}
+
+/** Reads a mesh file. `beside`: files that were opened with it. Rejects with a FileFault. */
+export function openedMesh(file: File, beside: readonly File[]): Promise<Mesh> {
+  return meshFrom({ file, beside });
+}
+
+/** The mesh that was stored. Rejects if the browser no longer has it. */
+export function openedStored(stored: StoredMesh, welding: Welding): Promise<Mesh> {
+  return meshFrom({ stored }, welding);
+}
+
+async function meshFrom(source: Source, welding = usualWelding): Promise<Mesh> {
+  const one = await OpenMesh.from(source, welding);
+  all.set(one.mesh, Promise.resolve(one));
+  return one.mesh;
+}
+
+/** Finds what is needed to show a mesh. */
+export async function prepare(mesh: Mesh, welding: Welding): Promise<void> {
+  if (isKnown(mesh, welding)) return;
+  const one = await openOf(mesh, welding);
+  if (!isKnown(mesh, welding)) await one.reweld(welding);
+}
+
+/** Takes the frames of a large mesh; undefined if the page takes them itself. */
+export function workerOf(mesh: Mesh): MeshWorker | undefined {
+  if (mesh.positions.length < 3 * largeVertices) return undefined;
+  const one = openOf(mesh, derivedOf(mesh).welding);
+  return {
+    unpack: async (packed) => (await one).unpack(packed),
+    shade: async (surface) => (await one).shade(surface),
+    pull: async (request) => (await one).pull(request),
+  };
+}
+
+/** For the browser's database, without copying a large mesh. */
+export async function storedOf(mesh: Mesh): Promise<Mesh | StoredMesh> {
+  const one = await all.get(mesh);
+  if (!one?.isInWorker) return mesh;
+  return one.store().catch(() => mesh); // the worker has just ended
+}
+
+/** Ends the workers of all other meshes. */
+export function keepOnly(mesh: Mesh): void {
+  for (const [other, one] of all) {
+    if (other === mesh) continue;
+    all.delete(other);
+    void one.then((it) => it.close());
   }
-  return meshOf(file, beside);
 }
 
-/** Reads a mesh file on this thread. */
-export async function meshOf(file: File, beside: readonly File[]): Promise<Mesh> {
-  const bytesOf = async (one: File) => new Uint8Array(await one.arrayBuffer());
-  const others = await Promise.all(beside.map(async (one) => [one.name, await bytesOf(one)] as const));
-  return readMesh(file.name, await bytesOf(file), new Map(others));
-}
-
-/** Finds what is needed to show a mesh; for a large one in a worker. */
-export async function prepare(mesh: Mesh): Promise<void> {
-  const isLarge = mesh.positions.byteLength + mesh.faces.byteLength > smallBytes;
-  const answer = isLarge ? await askWorker({ mesh }) : undefined;
-  if (answer) know(mesh, withClasses(answer));
-  else derivedOf(mesh);
-}
-
-type Found = Extract<Answer, { derived: unknown }>;
-
-function withClasses({ derived: { seams, ...derived } }: Found): Derived {
-  return { ...derived, seams: seams && new Seams(seams.groups, seams.faces) };
-}
-
-/** Undefined if this page can have no worker. */
-function askWorker(asked: Asked): Promise<Found | undefined> {
-  let worker: Worker;
-  try {
-    worker = new Worker(new URL("./opening_worker.ts", import.meta.url), { type: "module" });
-  } catch {
-    return Promise.resolve(undefined);
-  }
-  return new Promise<Found | undefined>((resolve, reject) => {
-    worker.onerror = () => resolve(undefined);
-    worker.onmessage = ({ data }: MessageEvent<Answer>) => {
-      if ("fault" in data) reject(new FileFault(data.fault));
-      else if ("error" in data) reject(new Error(data.error));
-      else resolve(data);
-    };
-    worker.postMessage(asked);
-  }).finally(() => worker.terminate());
+function openOf(mesh: Mesh, welding: Welding): Promise<OpenMesh> {
+  const known = all.get(mesh);
+  if (known) return known;
+  const one = OpenMesh.from({ mesh }, welding);
+  all.set(mesh, one);
+  return one;
 }

@@ -1,4 +1,4 @@
-import type { Vector3 } from "../model/mesh.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
 
 /** Whether it is x, y and z of a place that can be drawn. */
 export function isPlace(json: unknown): json is Vector3 {

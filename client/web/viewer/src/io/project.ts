@@ -1,11 +1,12 @@
+import { usualWelding } from "lpdeform-client/mesh/derived";
 import type { Encoding } from "lpdeform-client";
 import { type Document, emptyDocument, type Handle, handleOf } from "../model/document.js";
 import { leastP, mostP } from "../model/exponent.js";
-import type { Mesh, Vector3 } from "../model/mesh.js";
+import type { Mesh, Vector3 } from "lpdeform-client/mesh/mesh";
 import type { Pose } from "../model/pose.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
 import { type ColourBy, colourings, type View } from "../model/view.js";
-import { FileFault } from "./fault.js";
+import { FileFault } from "lpdeform-client/mesh/fault";
 import { gunzip, gzip } from "./gzip.js";
 import { isPlace } from "./places.js";
 import { readKeyPoses, readPose } from "./project_poses.js";
@@ -28,6 +29,7 @@ export type ProjectView = Pick<
   | "isYUp"
   | "pinned"
   | "isWelded"
+  | "weldTolerance"
   | "isSplit"
   | "colourBy"
   | "wireframe"
@@ -57,6 +59,7 @@ const viewChecks: { readonly [K in keyof ProjectView]: (value: unknown) => boole
   isYUp: isBoolean,
   pinned: (value) => value === undefined || (typeof value === "number" && value > 0 && value < Infinity),
   isWelded: isBoolean,
+  weldTolerance: (value) => typeof value === "number" && value >= 0 && value <= 0.001,
   isSplit: isBoolean,
   colourBy: oneOf<ColourBy>(...colourings),
   wireframe: isBoolean,
@@ -153,7 +156,8 @@ function markOf(marks: unknown, k: number, name: string, file: string): Mark {
 
 /** Keys that this page does not know are those of a later one, and change nothing of the work. */
 function viewOf(json: unknown, document: Document, file: string): ProjectView {
-  const view = isObject(json) ? json : {};
+  const { tolerance: weldTolerance } = usualWelding; // earlier pages wrote none
+  const view: Record<string, unknown> = { weldTolerance, ...(isObject(json) && json) };
   for (const key of viewKeys) {
     if (viewChecks[key](view[key])) continue;
     throw new FileFault(`In ${file}, “${key}” of the view is ${JSON.stringify(view[key])}, which it cannot be.`);

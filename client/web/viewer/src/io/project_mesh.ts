@@ -1,12 +1,12 @@
-import { type Mesh, polygonsOf } from "../model/mesh.js";
-import { MeshBuilder } from "./builder.js";
-import { FileFault } from "./fault.js";
-import { readGltf } from "./gltf.js";
-import { readObj } from "./obj.js";
+import { type Mesh, polygonsOf } from "lpdeform-client/mesh/mesh";
+import { MeshBuilder } from "lpdeform-client/mesh/builder";
+import { FileFault } from "lpdeform-client/mesh/fault";
+import { readGltf } from "lpdeform-client/mesh/gltf";
+import { readObj } from "lpdeform-client/mesh/obj";
 import { isObject, type Sections } from "./sections.js";
 
 /** Where each part of a mesh goes in a project. One that is missing does not compile. */
-const parts: { readonly [K in keyof Required<Mesh>]: "head" | "array" | "source" } = {
+const parts: { readonly [K in keyof Required<Mesh>]: "head" | "array" | "source" | "left" } = {
   name: "head",
   positions: "array",
   exact: "array",
@@ -14,6 +14,7 @@ const parts: { readonly [K in keyof Required<Mesh>]: "head" | "array" | "source"
   corners: "array",
   beside: "head",
   obj: "source",
+  materials: "left",
   gltf: "source",
 };
 

@@ -1,8 +1,8 @@
 import { leastP, mostP } from "../model/exponent.js";
 import type { KeyPose } from "../model/document.js";
 import { leastScale, mostScale, type Pose, type Quaternion } from "../model/pose.js";
-import type { Vector3 } from "../model/mesh.js";
-import { FileFault } from "./fault.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
+import { FileFault } from "lpdeform-client/mesh/fault";
 import { isPlace } from "./places.js";
 import { isObject } from "./sections.js";
 

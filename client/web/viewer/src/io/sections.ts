@@ -1,4 +1,4 @@
-import { FileFault } from "./fault.js";
+import { FileFault } from "lpdeform-client/mesh/fault";
 
 const kinds = { u8: Uint8Array, u32: Uint32Array, f32: Float32Array, f64: Float64Array } as const;
 type Kind = keyof typeof kinds;

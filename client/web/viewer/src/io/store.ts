@@ -1,6 +1,7 @@
 import type { Document } from "../model/document.js";
 import type { Steps } from "../model/history.js";
-import type { Mesh, Vector3 } from "../model/mesh.js";
+import type { Mesh, Vector3 } from "lpdeform-client/mesh/mesh";
+import type { StoredMesh } from "lpdeform-client/mesh/stored";
 import type { View } from "../model/view.js";
 
 /** The work of one tab as it is kept over a reload. Its mesh is stored separately, because it seldom changes. */
@@ -25,7 +26,7 @@ export interface Work {
 }
 
 export interface AsideWork extends Pick<Work, "document" | "steps" | "camera" | "meshKey"> {
-  view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned" | "isWelded">;
+  view: Pick<View, "shape" | "detail" | "selected" | "isYUp" | "pinned" | "isWelded"> & Partial<Pick<View, "weldTolerance">>;
 }
 
 /** Comes after all keys that begin with an id and "/". */
@@ -49,7 +50,7 @@ export class Store {
   }
 
   /** Stores everything or nothing. `newMeshes`: meshes that are not stored yet, with their keys. */
-  put(work: Work, newMeshes: readonly (readonly [Mesh, string])[]): Promise<void> {
+  put(work: Work, newMeshes: readonly (readonly [Mesh | StoredMesh, string])[]): Promise<void> {
     const { id, meshKey, asides } = work;
     return this.#write((works, meshes) => {
       works.put(work);
@@ -75,8 +76,9 @@ export class Store {
     return all.filter(({ version }) => version === 2).sort((a, b) => b.savedAt - a.savedAt);
   }
 
-  mesh(id: string): Promise<Mesh | undefined> {
-    return answer<Mesh | undefined>(this.database.transaction("meshes").objectStore("meshes").get(id));
+  /** As it was put. */
+  mesh(id: string): Promise<Mesh | StoredMesh | undefined> {
+    return answer<Mesh | StoredMesh | undefined>(this.database.transaction("meshes").objectStore("meshes").get(id));
   }
 
   #write(change: (works: IDBObjectStore, meshes: IDBObjectStore) => void): Promise<void> {

@@ -1,6 +1,6 @@
 import * as three from "three";
 import { STLExporter } from "three/examples/jsm/exporters/STLExporter.js";
-import type { WrittenMesh } from "../model/mesh.js";
+import type { WrittenMesh } from "lpdeform-client/mesh/mesh";
 
 /** Binary, in float32, as STL is. */
 export function writeStl({ positions, faces }: WrittenMesh): Uint8Array<ArrayBuffer> {

@@ -3,6 +3,7 @@ import {
   type BetterShapeNotice,
   type Encoding,
   type Frame,
+  type FrameShading,
   LpdeformError,
   type MeshReport,
   type Notice,
@@ -10,18 +11,17 @@ import {
   type Session,
   type SolveResult,
   joinSession,
+  type Weld,
 } from "lpdeform-client";
 import { changes, exponent, newSession, type Side } from "../model/changes.js";
 import type { Document } from "../model/document.js";
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { Meter } from "./meter.js";
 import { Pulse } from "./pulse.js";
 import { isPassing, notAnswering, say, type Status, statusAtEnd, statusOf } from "./status.js";
 import { watchedStatus } from "./watched.js";
 
 export interface LiveWatcher {
-  /** Prepares a frame elsewhere before it waits to be taken. Undefined: the page takes it as it is. */
-  prepare?(frame: Frame): Promise<void> | undefined;
   /** A frame waits to be taken. */
   frame(): void;
   status(status: Status): void;
@@ -52,8 +52,6 @@ export class Live {
   #session: Session | undefined;
   #told = newSession;
   #waiting: Frame | undefined;
-  /** Whether frames are prepared elsewhere; a frame that was not cannot be taken in the place of one that was. */
-  #isPrepared = false;
   #taken: (() => void) | undefined;
   #inputs: { seq: number; time: number; sent: number }[] = [];
   #said: Notice | undefined;
@@ -75,10 +73,12 @@ export class Live {
     readonly side: Side,
     readonly encoding: Encoding,
     readonly watcher: LiveWatcher,
-    /** For each vertex a number, the same for vertices that count as one. */
-    readonly weld?: Uint32Array,
+    /** Which vertices count as one. */
+    readonly weld?: Weld,
     /** Somebody else's session, which is only shown. */
     readonly watched?: string,
+    /** Finds what is drawn of frames; undefined if the page does. */
+    readonly shading?: FrameShading,
   ) {
     this.#pulse = new Pulse(
       async () => this.#session?.ping(),
@@ -98,7 +98,7 @@ export class Live {
     const frame = this.#waiting;
     if (!frame) return undefined;
     this.#waiting = undefined;
-    const newer = this.#isPrepared ? undefined : this.#poll();
+    const newer = this.#poll();
     this.#taken?.();
     this.#answer(newer ?? frame);
     return newer ?? frame;
@@ -193,15 +193,17 @@ export class Live {
     this.watcher.better();
   }
 
-  close(): void {
+  /** `isPageLeft`: the server is told even if the page is there no longer. */
+  close(isPageLeft = false): void {
     this.#over.abort();
     this.#pulse.stop();
     this.#taken?.();
-    this.#session?.close().catch(() => undefined); // the session expires by itself if the server is away
+    this.#session?.close({ keepalive: isPageLeft }).catch(() => undefined); // the session expires by itself if the server is away
     this.#session = undefined;
   }
 
   async #run(): Promise<void> {
+    await new Promise((begin) => setTimeout(begin)); // the task that has opened the mesh has done enough
     while (!this.#over.signal.aborted) {
       const session = await this.#open();
       if (!session) return;
@@ -239,6 +241,7 @@ export class Live {
         certify: true,
         maxFramesPerSecond: 60,
         signal,
+        ...(this.shading && { shading: this.shading }),
       } as const;
       try {
         if (this.watched) return await joinSession(this.watched, frames);
@@ -267,10 +270,6 @@ export class Live {
         if (this.#over.signal.aborted) break;
         hadFrames = true;
         this.#pulse.heard();
-        const prepared = this.watcher.prepare?.(frame);
-        this.#isPrepared = prepared !== undefined;
-        await prepared;
-        if (this.#over.signal.aborted) break;
         this.#waiting = frame;
         const taken = new Promise<void>((resolve) => (this.#taken = resolve));
         this.watcher.frame();

@@ -1,4 +1,4 @@
-import { percentile } from "../model/statistics.js";
+import { percentile } from "lpdeform-client/mesh/statistics";
 
 /** What the last second has brought, and how long inputs took. Times are milliseconds of performance.now(). */
 export class Meter {

@@ -1,8 +1,8 @@
-import { openSession } from "lpdeform-client";
+import { openSession, type Weld } from "lpdeform-client";
 import type { Shape } from "../model/blend.js";
 import { changes, newSession } from "../model/changes.js";
 import type { Document } from "../model/document.js";
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 
 /**
  * The shapes of these documents, in this order, each solved from the one before, in a session of its own. `weld`: as in Live. Throws
@@ -11,7 +11,7 @@ import type { Mesh } from "../model/mesh.js";
 export async function* shapesOf(
   mesh: Mesh,
   documents: readonly Document[],
-  weld: Uint32Array | undefined,
+  weld: Weld | undefined,
   signal: AbortSignal,
 ): AsyncGenerator<Shape> {
   const { positions, exact, faces } = mesh;

@@ -1,17 +1,21 @@
 const beatMs = 100;
-/** How long after the last answer the next question comes, and how long its answer may take. In beats. */
-const restBeats = 4;
-const patienceBeats = 9;
+/** How long after the last answer the next question comes, and how long its answer may take. */
+const restMs = 400;
+const patienceMs = 900;
+/** A beat that comes later than this was delayed by the page itself: the rest of the delay does not count. */
+const longestBeatMs = 250;
 
 /**
  * Asks again and again whether the server answers. A server that was stopped, or whose proxy was, says nothing, and its stream
- * is silent anyway when nothing changes. Time is counted in beats of the page's own clock, so a page that is busy itself does not
- * take that for the server's silence. A hidden page does not ask.
+ * is silent anyway when nothing changes. Time is counted in beats of the page's own clock, so a page that was busy for long itself
+ * does not take that for the server's silence. A hidden page does not ask.
  */
 export class Pulse {
   isSilent = false;
   #timer: ReturnType<typeof setInterval> | undefined;
-  #beats = 0;
+  #lastBeat = 0;
+  /** In milliseconds: since the question, or since the last answer. */
+  #waited = 0;
   #isAsking = false;
   /** Counts starts and stops: an answer to an earlier run does not matter. */
   #run = 0;
@@ -27,12 +31,13 @@ export class Pulse {
 
   start(): void {
     this.stop();
+    this.#lastBeat = performance.now();
     this.#timer = setInterval(() => this.#beat(), beatMs);
   }
 
   /** Something else came from the server: there is no need to ask for a while. */
   heard(): void {
-    this.#beats = 0;
+    this.#waited = 0;
     this.#set(false);
   }
 
@@ -40,21 +45,23 @@ export class Pulse {
   stop(): void {
     clearInterval(this.#timer);
     ++this.#run;
-    this.#beats = 0;
+    this.#waited = 0;
     this.#isAsking = this.isSilent = false;
   }
 
   #beat(): void {
-    ++this.#beats;
-    if (this.#isAsking && this.#beats >= patienceBeats) this.#set(true);
-    if (this.#isAsking || this.#beats < restBeats || globalThis.document?.hidden) return;
+    const now = performance.now();
+    this.#waited += Math.min(now - this.#lastBeat, longestBeatMs);
+    this.#lastBeat = now;
+    if (this.#isAsking && this.#waited >= patienceMs) this.#set(true);
+    if (this.#isAsking || this.#waited < restMs || globalThis.document?.hidden) return;
     this.#isAsking = true;
-    this.#beats = 0;
+    this.#waited = 0;
     const run = this.#run;
     const done = () => {
       if (run !== this.#run) return;
       this.#isAsking = false;
-      this.#beats = 0;
+      this.#waited = 0;
       this.#set(false);
     };
     this.ask().then(done, done);

@@ -1,5 +1,5 @@
 import { Backoff, joinSession, type LpdeformError } from "lpdeform-client";
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { isPassing, say, sentence, type Status, statusOf } from "./status.js";
 
 // A session of somebody else, which a link names: "/#watch=" and its 32 hexadecimal digits. Who knows the name may also write to the

@@ -1,4 +1,4 @@
-import type { Vector3 } from "./mesh.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
 
 export type AxisView = "front" | "right" | "top" | "back" | "left" | "bottom";
 

@@ -1,4 +1,4 @@
-import type { Mesh } from "./mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 
 /** The boundary of the solid cells among nx x ny x nz unit cells, with two triangles per side and one corner at the origin. */
 export function blockSurface(nx: number, ny: number, nz: number, isSolid: (x: number, y: number, z: number) => boolean): Mesh {

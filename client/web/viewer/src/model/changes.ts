@@ -1,7 +1,7 @@
 import type { FieldValue, Handle as WireHandle, HandleChange, Motion, Settings, Update } from "lpdeform-client";
 import { type Document, emptyDocument, type Handle, pField } from "./document.js";
 import { kindOf } from "./hold_kinds.js";
-import type { Mesh } from "./mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { toMotion } from "./pose.js";
 import { targetsOf } from "./targets.js";
 

@@ -1,5 +1,5 @@
 import { surfaceNet } from "./surfacenet.js";
-import type { Mesh, Vector3 } from "./mesh.js";
+import type { Mesh, Vector3 } from "lpdeform-client/mesh/mesh";
 
 /** A cone with round ends: from a (radius ra) to b (radius rb). */
 interface Limb {

@@ -1,7 +1,7 @@
 import type { Hold, SurfacePoint } from "lpdeform-client";
 import { groupColours } from "./colours.js";
 import { fitPose } from "./fit.js";
-import { centroid, type Vector3 } from "./mesh.js";
+import { centroid, type Vector3 } from "lpdeform-client/mesh/mesh";
 import { about, add, type Pose } from "./pose.js";
 
 /** A group of vertices, or of points inside faces (from a file), that the user holds. */
@@ -172,8 +172,17 @@ export function withoutPaint(document: Document): Document {
 
 /** p of each vertex, if it is painted. */
 export function pField({ paintedP }: Document, p: number): Float32Array | undefined {
-  return paintedP?.map((value) => (Number.isNaN(value) ? p : value));
+  if (!paintedP) return undefined;
+  const before = fields.get(paintedP);
+  if (before?.p === p) return before.field;
+  const field = paintedP.slice();
+  for (let vertex = 0; vertex < field.length; ++vertex) if (Number.isNaN(field[vertex]!)) field[vertex] = p;
+  fields.set(paintedP, { p, field });
+  return field;
 }
+
+/** The last one of each painting: it is sent and drawn. */
+const fields = new WeakMap<Float32Array, { p: number; field: Float32Array }>();
 
 /** The anchor of a handle; for one with targets, the middle of the targets. */
 export function anchorOfHandle(handle: Handle): Vector3 {

@@ -1,4 +1,4 @@
-import type { Vector3 } from "./mesh.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
 import type { Quaternion } from "./pose.js";
 
 /** The rotation by these degrees about x, then about y, then about z, axes that do not turn along. */

@@ -1,4 +1,4 @@
-import { centroid } from "./mesh.js";
+import { centroid } from "lpdeform-client/mesh/mesh";
 import { atRest, type Pose, type Quaternion } from "./pose.js";
 
 /** The rigid motion that best takes the vertices from `rest` to `current` (Horn's quaternion). */

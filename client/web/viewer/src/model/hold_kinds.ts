@@ -1,5 +1,5 @@
 import type { Hold } from "lpdeform-client";
-import type { Vector3 } from "./mesh.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
 
 /** What the page and its handle files know of a kind of hold. */
 export type HoldKind<H extends Hold = Hold> = Common<H> & (None | Weight<H> | Direction<H>);

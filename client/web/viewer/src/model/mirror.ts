@@ -1,5 +1,5 @@
-import { type Bounds, type Mesh, type Vector3 } from "./mesh.js";
-import type { Adjacency } from "./adjacency.js";
+import { type Bounds, type Mesh, type Vector3 } from "lpdeform-client/mesh/mesh";
+import type { Adjacency } from "lpdeform-client/mesh/adjacency";
 
 /** The plane across which work is done on both sides: by the axis that it cuts, through the middle of the mesh. */
 export type Symmetry = "none" | "x" | "y" | "z";
@@ -63,6 +63,12 @@ export class Mirror {
     const other = [...point] as [number, number, number];
     other[this.axis] = 2 * this.#middle - other[this.axis];
     return other;
+  }
+
+  /** Where a vertex is at rest. */
+  placeOf(vertex: number): Vector3 {
+    const [x, y, z] = this.#positions.subarray(3 * vertex, 3 * vertex + 3);
+    return [x!, y!, z!];
   }
 
   /** The vector as seen in the mirror. */

@@ -1,5 +1,5 @@
 import type { Motion } from "lpdeform-client";
-import type { Vector3 } from "./mesh.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
 
 /** x, y, z, w of a unit quaternion. */
 export type Quaternion = readonly [number, number, number, number];

@@ -1,4 +1,4 @@
-import { type FaceBlocks, visitFaces } from "./face_blocks.js";
+import { type FaceBlocks, visitFaces } from "lpdeform-client/mesh/face_blocks";
 
 export interface Hit {
   face: number;

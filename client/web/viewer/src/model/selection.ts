@@ -1,4 +1,4 @@
-import type { Adjacency } from "./adjacency.js";
+import type { Adjacency } from "lpdeform-client/mesh/adjacency";
 
 /**
  * The vertices within `radius` of `point` that are connected to `seed` within it, `seed` first. So a brush does not reach

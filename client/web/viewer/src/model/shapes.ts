@@ -1,6 +1,6 @@
 import { addHandle, type Document, emptyDocument, type Handle } from "./document.js";
 import { creature } from "./creature.js";
-import type { Mesh } from "./mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { blockSurface } from "./block.js";
 
 export type Detail = "coarse" | "medium" | "fine";

@@ -1,4 +1,4 @@
-import type { Vector3 } from "./mesh.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
 import { add, conjugate, type Quaternion, rotate, subtract } from "./pose.js";
 
 /** What a handle that is dragged keeps to. */

@@ -1,4 +1,4 @@
-import type { Adjacency } from "./adjacency.js";
+import type { Adjacency } from "lpdeform-client/mesh/adjacency";
 import { type Document, withoutField } from "./document.js";
 
 export type PaintField = "p" | "stiffness";
@@ -44,7 +44,7 @@ export function paintSoftly(
   const canvas = { old, base, unpainted, adjacency, groups };
   const now = old.slice();
   for (const [vertex, strength] of strengths) if (strength > 0) now[vertex] = painted(canvas, brush, vertex, strength);
-  if (now.every((value) => Object.is(value, unpainted))) return withoutField(document, key);
+  if (brush.mode === "erase" && now.every((value) => Object.is(value, unpainted))) return withoutField(document, key);
   return { ...document, [key]: now, isAutomatic: false };
 }
 

@@ -1,5 +1,5 @@
-import { adjacencyOf } from "./adjacency.js";
-import type { Mesh, Vector3 } from "./mesh.js";
+import { adjacencyOf } from "lpdeform-client/mesh/adjacency";
+import type { Mesh, Vector3 } from "lpdeform-client/mesh/mesh";
 
 export type Field = (x: number, y: number, z: number) => number;
 

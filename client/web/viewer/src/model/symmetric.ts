@@ -1,7 +1,8 @@
 import { changeHandle, type Document, type Handle, removeHandle } from "./document.js";
 import { kindOf } from "./hold_kinds.js";
 import type { Mirror } from "./mirror.js";
-import { about, type Pose, type Quaternion } from "./pose.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
+import { about, apply, type Pose, type Quaternion } from "./pose.js";
 
 /** So many vertices of a handle say where its partner is. */
 const samples = 64;
@@ -56,13 +57,46 @@ function withoutPartners(before: Document, after: Document, mirror: Mirror): Doc
 
 /** What has changed of a handle, for its partner. */
 function imageOf(old: Handle, now: Handle, partner: Handle, mirror: Mirror): Partial<Handle> {
-  const isPosed = old.pose !== now.pose && !now.targets && !partner.targets && !partner.isLocked;
+  const hasMoved = old.pose !== now.pose || old.targets !== now.targets;
   return {
-    ...(isPosed && { pose: about(mirrored(now.pose, mirror), partner.pose.center) }),
+    ...(hasMoved && !partner.isLocked && movedAs(now, partner, mirror)),
     ...(old.hold !== now.hold && { hold: mirroredHold(now, mirror) }),
     ...(old.footprint !== now.footprint && { footprint: now.footprint }),
     ...(old.isLocked !== now.isLocked && { isLocked: now.isLocked }),
   };
+}
+
+/** Places of their own count for vertices. Points inside faces have no images. */
+function movedAs(now: Handle, partner: Handle, mirror: Mirror): Partial<Handle> {
+  const { targets, pose } = now;
+  if (!targets)
+    return { pose: about(mirrored(pose, mirror), partner.pose.center), ...(partner.targets && { targets: undefined }) };
+  if (now.points || partner.points) return {};
+  const reflected = reflections(now.vertices, targets, mirror);
+  return {
+    targets: partner.vertices.flatMap((vertex, k) => [...(reflected(vertex) ?? placeNow(partner, vertex, k, mirror))]),
+  };
+}
+
+/** For a vertex the reflection of the place of its image, if its image is one of these. */
+function reflections(
+  vertices: readonly number[],
+  targets: readonly number[],
+  mirror: Mirror,
+): (vertex: number) => Vector3 | undefined {
+  const numbers = new Map(vertices.map((vertex, k) => [vertex, k]));
+  return (vertex) => {
+    const at = numbers.get(mirror.imageOf(vertex) ?? -1);
+    return at === undefined ? undefined : mirror.reflected(placeAt(targets, at));
+  };
+}
+
+function placeNow({ targets, pose }: Handle, vertex: number, k: number, mirror: Mirror): Vector3 {
+  return targets ? placeAt(targets, k) : apply(pose, mirror.placeOf(vertex));
+}
+
+function placeAt(targets: readonly number[], k: number): Vector3 {
+  return [targets[3 * k]!, targets[3 * k + 1]!, targets[3 * k + 2]!];
 }
 
 function mirroredHold({ hold }: Handle, mirror: Mirror): Handle["hold"] {
@@ -82,9 +116,19 @@ function mirrored({ rotation, translation, center, ...scale }: Pose, mirror: Mir
   };
 }
 
-/** A new pose without what would leave the plane: movement across it, and turns about axes in it. */
-function onPlane(old: Handle, { pose, targets }: Handle, { axis }: Mirror): Partial<Handle> {
-  if (pose === old.pose || targets) return {};
+/** A new pose without what would leave the plane: movement across it, and turns about axes in it. Places become alike on both sides. */
+function onPlane(old: Handle, { pose, targets, vertices, points }: Handle, mirror: Mirror): Partial<Handle> {
+  const { axis } = mirror;
+  if (targets) {
+    if (targets === old.targets || points) return {};
+    const reflected = reflections(vertices, targets, mirror);
+    const evened = vertices.flatMap((vertex, k) => {
+      const own = placeAt(targets, k);
+      return (reflected(vertex) ?? own).map((value, axis) => (value + own[axis]!) / 2);
+    });
+    return { targets: evened };
+  }
+  if (pose === old.pose) return {};
   const translation = pose.translation.map((value, k) => (k === axis ? 0 : value)) as unknown as Pose["translation"];
   const length = Math.hypot(pose.rotation[axis], pose.rotation[3]);
   const rotation = pose.rotation.map((value, k) => (k === axis || k === 3 ? value / length : 0)) as unknown as Quaternion;

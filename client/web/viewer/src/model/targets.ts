@@ -1,5 +1,5 @@
 import type { Handle } from "./document.js";
-import type { Mesh } from "./mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { follow, placesOf } from "./places.js";
 import { apply } from "./pose.js";
 

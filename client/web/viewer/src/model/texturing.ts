@@ -6,6 +6,8 @@ export interface Texturing {
   corners: Uint32Array;
   /** Together they are all faces, in their order. */
   layers: readonly TextureLayer[];
+  /** Images that the file names and that are not there. */
+  missing?: readonly string[];
 }
 
 /** Faces, one after the other, with one image. */

@@ -1,6 +1,6 @@
 import { anchorOfHandle, changeHandle, type Document, type Handle, handleOf, shifted } from "./document.js";
 import { kindOf } from "./hold_kinds.js";
-import type { Vector3 } from "./mesh.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
 import { add, anchorOf, conjugate, noScale, type Pose, product, rotate, scaled, subtract, times } from "./pose.js";
 import type { View } from "./view.js";
 

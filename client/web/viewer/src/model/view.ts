@@ -1,4 +1,5 @@
 import type { Encoding } from "lpdeform-client";
+import { usualWelding } from "lpdeform-client/mesh/derived";
 import type { PaletteName } from "./palettes.js";
 import type { Snapping } from "./snap.js";
 import type { Symmetry } from "./mirror.js";
@@ -57,6 +58,8 @@ export interface View {
   isParallel: boolean;
   /** Whether vertices in the same place along seams count as one; see Seams. */
   isWelded: boolean;
+  /** How far apart they may be, as a share of the diagonal. */
+  weldTolerance: number;
   isDark: boolean;
   isPanelOpen: boolean;
   /** Whether letters, digits and signs are shortcuts. */
@@ -91,7 +94,8 @@ export const firstView: View = {
   isSplit: false,
   isYUp: false,
   isParallel: false,
-  isWelded: true,
+  isWelded: usualWelding.isOn,
+  weldTolerance: usualWelding.tolerance,
   isDark: true,
   isPanelOpen: true,
   hasSingleKeys: true,

@@ -1,6 +1,6 @@
 import * as three from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
-import type { Vector3 } from "../model/mesh.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
 import { conjugate, isAtRest, noRotation, noScale, type Pose, product, type Quaternion, scaled } from "../model/pose.js";
 import { onGrid, onTurnedGrid, scaleStep, turnStep } from "../model/snap.js";
 import type { GizmoAxes, GizmoMode } from "../model/view.js";

@@ -1,5 +1,5 @@
 import * as three from "three";
-import type { Bounds } from "../model/mesh.js";
+import type { Bounds } from "lpdeform-client/mesh/mesh";
 import type { MirrorAxis } from "../model/mirror.js";
 
 /** How far its edges stand out from the mesh, as a share of the diagonal. */

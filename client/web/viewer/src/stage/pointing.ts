@@ -1,5 +1,5 @@
 import * as three from "three";
-import type { Vector3 } from "../model/mesh.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
 import type { Hit } from "../model/raycast.js";
 import type { Stage } from "./stage.js";
 

@@ -1,7 +1,7 @@
 import * as three from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { derivedOf } from "../model/derived.js";
-import { boundsOf, type Mesh, type Vector3 } from "../model/mesh.js";
+import { derivedOf } from "lpdeform-client/mesh/derived";
+import { boundsOf, type Mesh, type Vector3 } from "lpdeform-client/mesh/mesh";
 import { Backdrop } from "./backdrop.js";
 import { Highlight } from "./highlight.js";
 import { LateGizmo } from "./late_gizmo.js";
@@ -49,6 +49,8 @@ export class Stage {
   readonly #renderer: three.WebGLRenderer;
   readonly #scene = new three.Scene();
   #controls: OrbitControls | undefined;
+  /** Kept until the next picture, which draws by the same programs of the GPU: compiling them takes long. */
+  readonly #replaced: Surface[] = [];
   #pixelRatio = 0;
   #size = [0, 0];
 
@@ -58,6 +60,7 @@ export class Stage {
     this.canvas.setAttribute("role", "application"); // keys are for the picture
     this.canvas.setAttribute("aria-roledescription", "picture to work in");
     this.#renderer = new three.WebGLRenderer({ canvas: this.canvas, antialias: !isSoftware, alpha: false });
+    this.#renderer.debug.checkShaderErrors = import.meta.env.DEV; // the page would wait for the compiler
     this.canvas.addEventListener("webglcontextrestored", changed);
     this.#camera.up.set(0, 0, 1);
     this.highlight = new Highlight(changed);
@@ -129,11 +132,12 @@ export class Stage {
     this.lookFrom(look);
   }
 
-  /** `faces`: the faces to shade smoothly, if these are not the mesh's own. */
-  open(mesh: Mesh, faces?: Uint32Array): void {
-    const surface = new Surface(mesh, faces); // made before the old one is removed, because there may be no memory for it
-    this.surface?.group.removeFromParent();
-    this.surface?.dispose();
+  open(mesh: Mesh): void {
+    const surface = new Surface(mesh); // made before the old one is removed, because there may be no memory for it
+    if (this.surface) {
+      this.surface.group.removeFromParent();
+      this.#replaced.push(this.surface);
+    }
     this.surface = surface;
     this.marks.attach(surface.ahead);
     this.pointed.attach(surface);
@@ -302,7 +306,9 @@ export class Stage {
 
   draw(): void {
     this.gizmo.follow();
+    if (this.surface?.send()) this.changed();
     this.#renderer.render(this.#scene, this.camera);
+    for (const surface of this.#replaced.splice(0)) surface.dispose();
   }
 
   /** What is drawn, as fine as at rest, without the gizmo. */
@@ -310,6 +316,7 @@ export class Stage {
     this.resize(this.width, this.height, false);
     const wasVisible = this.gizmo.object.visible;
     this.gizmo.object.visible = false;
+    while (this.surface?.send());
     this.draw();
     const copy = document.createElement("canvas");
     copy.width = this.canvas.width;
@@ -334,7 +341,7 @@ export class Stage {
     this.highlight.dispose();
     this.pointed.dispose();
     this.plane.dispose();
-    this.surface?.dispose();
+    for (const surface of [this.surface, ...this.#replaced]) surface?.dispose();
     this.#renderer.dispose();
     this.#renderer.forceContextLoss(); // browsers allow only a few, and remove the oldest
     this.canvas.remove();

@@ -1,13 +1,15 @@
 import * as three from "three";
-import type { Adjacency } from "../model/adjacency.js";
-import { derivedOf, shownOf } from "../model/derived.js";
-import { blockBoxes, type FaceBlocks } from "../model/face_blocks.js";
-import type { Mesh } from "../model/mesh.js";
-import { Pairs } from "../model/pairs.js";
+import type { Adjacency } from "lpdeform-client/mesh/adjacency";
+import { type Derived, derivedOf } from "lpdeform-client/mesh/derived";
+import type { DrawnAt } from "lpdeform-client";
+import { drawInto, drawnAt, spread } from "lpdeform-client/mesh/drawmesh";
+import type { Drawn } from "lpdeform-client/mesh/drawn";
+import { blockBoxes, type FaceBlocks } from "lpdeform-client/mesh/face_blocks";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
+import { Pairs } from "lpdeform-client/mesh/pairs";
 import { type Hit, raycast } from "../model/raycast.js";
 import type { ColourBy, View } from "../model/view.js";
-import { DrawMesh } from "./drawmesh.js";
-import type { Intake, IntakeMesh } from "./intake.js";
+import type { Shaded } from "lpdeform-client";
 import { isSoftware } from "./software.js";
 import { colourByPixel, paint, surfaceMaterial } from "./surface_material.js";
 import type { Textured } from "./textured.js";
@@ -19,6 +21,9 @@ export interface Scale {
   isLogarithmic: boolean;
 }
 
+/** From this number of vertices on, the GPU is sent more than a picture has time for. */
+const largeVertices = 20_000;
+
 /** With this many vertices, lighting per vertex looks like lighting per pixel. */
 const denseVertices = 4000;
 
@@ -27,8 +32,11 @@ export class Surface {
   readonly group = new three.Group();
   /** The positions of the mesh's vertices, as drawn. */
   positions: Float32Array;
-  readonly #faces: Uint32Array;
-  readonly #draw: DrawMesh;
+  readonly #derived: Derived;
+  readonly #drawn: Drawn;
+  #at: DrawnAt;
+  /** Whether nobody else has those arrays. */
+  #isOwn = false;
   /** The motion of a handle since the frame; each vertex goes along as far as pull() has said. */
   readonly ahead = { value: new three.Matrix4() };
   #pull: Float32Array | undefined;
@@ -38,47 +46,72 @@ export class Surface {
   readonly #geometry = new three.BufferGeometry();
   readonly #values: Float32Array;
   readonly #pulls: Float32Array;
-  #intake: Intake | undefined;
+  #shaded: Shaded | undefined;
   readonly #isPerVertex: boolean;
   readonly #material: three.ShaderMaterial;
   readonly #wire = new three.LineSegments(
     new three.BufferGeometry(),
     new three.LineBasicMaterial({ transparent: true, opacity: 0.35 }),
   );
+  /** Attributes that the GPU does not have yet, one for each picture to come, and what sends them. Empty for small meshes. */
+  readonly #unsent: string[] = [];
+  readonly #sender: three.Points;
   readonly #ghost: three.Mesh;
   readonly #plain: three.Mesh;
   #textured: Textured | undefined;
 
-  constructor(
-    readonly mesh: Mesh,
-    faces = mesh.faces,
-  ) {
-    this.#faces = faces;
+  constructor(readonly mesh: Mesh) {
     this.positions = mesh.positions;
-    this.#draw = new DrawMesh({ positions: mesh.positions, faces }, shownOf(mesh, faces).drawn);
-    this.#values = new Float32Array(this.#draw.source.length);
-    this.#pulls = new Float32Array(this.#draw.source.length);
+    this.#derived = derivedOf(mesh);
+    const { drawn, atRest } = this.#derived.shown;
+    this.#drawn = drawn;
+    this.#at = atRest;
+    this.#values = new Float32Array(drawn.source.length);
+    this.#pulls = new Float32Array(drawn.source.length);
     this.#isPerVertex = isSoftware && mesh.positions.length > 3 * denseVertices;
-    this.#material = surfaceMaterial(this.#isPerVertex, this.#draw.isClosed, this.ahead);
+    this.#material = surfaceMaterial(this.#isPerVertex, drawn.isClosed, this.ahead);
     const geometry = this.#geometry;
-    geometry.setIndex(new three.BufferAttribute(this.#draw.indices, 1));
-    geometry.setAttribute("position", live(this.#draw.positions, 3));
-    geometry.setAttribute("normal", live(this.#draw.normals, 3));
+    const { center, diagonal } = this.#derived.bounds;
+    geometry.boundingSphere = new three.Sphere(new three.Vector3(...center), diagonal / 2); // three.js sorts by it
+    geometry.setIndex(new three.BufferAttribute(drawn.indices, 1));
+    geometry.setAttribute("position", live(this.#at.positions, 3));
+    geometry.setAttribute("normal", live(this.#at.normals, 3));
     geometry.setAttribute("value", live(this.#values, 1));
     geometry.setAttribute("pull", live(this.#pulls, 1));
     this.#ghost = this.#makeGhost();
     this.#plain = new three.Mesh(geometry, this.#material);
-    for (const object of [this.#plain, this.#wire, this.#ghost]) {
+    this.#sender = new three.Points(new three.BufferGeometry(), this.#material);
+    this.#sender.geometry.setDrawRange(0, 0);
+    this.#sender.geometry.boundingSphere = geometry.boundingSphere;
+    if (mesh.positions.length > 3 * largeVertices) this.#unsent.push("position", "normal", "value", "pull");
+    this.#plain.visible = this.#unsent.length === 0;
+    for (const object of [this.#plain, this.#wire, this.#ghost, this.#sender]) {
       object.frustumCulled = false;
       this.group.add(object);
     }
     this.#wire.visible = this.#ghost.visible = false;
   }
 
+  /**
+   * Called before each picture. The vertices of a large mesh go to the GPU in several pictures, before it is seen; true if more of
+   * them are needed.
+   */
+  send(): boolean {
+    const next = this.#unsent.shift();
+    if (next) this.#sender.geometry.setAttribute(next, this.#geometry.attributes[next]!);
+    this.#showPlain();
+    return this.#unsent.length > 0;
+  }
+
+  #showPlain(): void {
+    this.#plain.visible = this.#unsent.length === 0 && !this.#isTextured;
+    this.#sender.visible = this.#unsent.length > 0;
+  }
+
   /** Where a ray first meets the surface. */
   hit(origin: readonly [number, number, number], direction: readonly [number, number, number]): Hit | undefined {
     const { positions, mesh } = this;
-    const { order } = derivedOf(mesh);
+    const { order } = this.#derived;
     this.#blocks ??= { order, boxes: blockBoxes(positions, mesh.faces, order) };
     return raycast(positions, mesh.faces, origin, direction, this.#blocks);
   }
@@ -87,17 +120,18 @@ export class Surface {
   get drawnOf(): Uint32Array {
     if (this.#drawnOf) return this.#drawnOf;
     const drawn = new Uint32Array(this.mesh.positions.length / 3).fill(0xffffffff);
-    this.#draw.source.forEach((vertex, k) => (drawn[vertex] = k));
+    this.#drawn.source.forEach((vertex, k) => (drawn[vertex] = k));
     return (this.#drawnOf = drawn);
   }
 
   get adjacency(): Adjacency {
-    return shownOf(this.mesh, this.#faces).adjacency;
+    return this.#derived.shown.adjacency;
   }
 
   /** Gives a geometry the vertices of this one. */
   share(geometry: three.BufferGeometry): void {
     for (const name of ["position", "pull"]) geometry.setAttribute(name, this.#geometry.attributes[name]!);
+    geometry.boundingSphere = this.#geometry.boundingSphere;
   }
 
   /** `shares`: for each vertex of the mesh, how far it goes along with what is ahead; undefined: none does. */
@@ -107,14 +141,14 @@ export class Surface {
       this.ahead.value.identity();
       return;
     }
-    this.#draw.spread(shares, this.#pulls);
+    spread(shares, this.#drawn, this.#pulls);
     this.#show("pull", this.#pulls);
     if (this.#isTextured) this.#textured!.pull(this.#pulls);
   }
 
   /** Makes what is shown if colours are by texture. */
   dress(make: (indices: Uint32Array, makeMaterial: () => three.ShaderMaterial) => Textured): void {
-    this.#textured = make(this.#draw.indices, () => surfaceMaterial(this.#isPerVertex, this.#draw.isClosed, this.ahead));
+    this.#textured = make(this.#drawn.indices, () => surfaceMaterial(this.#isPerVertex, this.#drawn.isClosed, this.ahead));
     this.#textured.object.visible = false;
     this.group.add(this.#textured.object);
   }
@@ -129,27 +163,19 @@ export class Surface {
     return at.clone().lerp(at.applyMatrix4(this.ahead.value), this.#pull?.[vertex] ?? 0);
   }
 
-  /** For an IntakeWorker. */
-  get intakeMesh(): IntakeMesh {
-    const { positions, faces } = this.mesh;
-    const { adjacency, drawn } = shownOf(this.mesh, this.#faces);
-    return { positions, faces, drawn, adjacency, order: derivedOf(this.mesh).order };
-  }
-
-  /** Positions of the mesh's vertices; the array is kept. `intake`: what is drawn of them, if that was found elsewhere. */
-  move(positions: Float32Array, intake?: Intake): void {
+  /** Positions of the mesh's vertices; the array is kept. `shaded`: what is drawn of them, if that was found elsewhere. */
+  move(positions: Float32Array, shaded?: Shaded): void {
     this.positions = positions;
-    this.#intake = intake;
-    this.#blocks = intake && { order: derivedOf(this.mesh).order, boxes: intake.boxes };
-    if (intake) {
-      this.#draw.positions = intake.positions;
-      this.#draw.normals = intake.normals;
-    } else {
-      this.#draw.take(positions);
-    }
-    this.#show("position", this.#draw.positions);
-    this.#show("normal", this.#draw.normals);
-    if (this.#isTextured) this.#textured!.move(this.#draw);
+    const isOfThese = shaded?.positions.length === this.#at.positions.length; // not if the mesh was welded otherwise
+    this.#shaded = isOfThese ? shaded : undefined;
+    this.#blocks = this.#shaded && { order: this.#derived.order, boxes: this.#shaded.boxes };
+    if (this.#shaded) this.#at = this.#shaded;
+    else if (this.#isOwn) drawInto(this.#at, positions, this.#drawn);
+    else this.#at = drawnAt(positions, this.#drawn);
+    this.#isOwn = !this.#shaded;
+    this.#show("position", this.#at.positions);
+    this.#show("normal", this.#at.normals);
+    if (this.#isTextured) this.#textured!.move(this.#at);
   }
 
   #show(name: "position" | "normal" | "value" | "pull", array: Float32Array): void {
@@ -158,18 +184,22 @@ export class Surface {
     attribute.needsUpdate = true;
   }
 
-  colour(by: ColourBy, values: Float32Array | undefined, { low, red, isLogarithmic }: Scale): void {
-    if (values && by === "distortion" && this.#intake) {
-      this.#show("value", this.#intake.distortion);
+  /** `values`: of the mesh's vertices; 0 if all are. */
+  colour(by: ColourBy, values: Float32Array | 0 | undefined, { low, red, isLogarithmic }: Scale): void {
+    if (values === 0) {
+      this.#values.fill(0);
+      this.#show("value", this.#values);
+    } else if (values && by === "distortion" && this.#shaded) {
+      this.#show("value", this.#shaded.distortion);
     } else if (values) {
-      this.#draw.spread(values, this.#values);
+      spread(values, this.#drawn, this.#values);
       this.#show("value", this.#values);
     }
     const uniforms = this.#material.uniforms;
     uniforms["low"]!.value = low;
     uniforms["red"]!.value = red;
     uniforms["logarithmic"]!.value = isLogarithmic ? 1 : 0;
-    uniforms["colourful"]!.value = values ? 1 : 0;
+    uniforms["colourful"]!.value = values === undefined ? 0 : 1;
     colourByPixel(this.#material, by, this.#isPerVertex);
     this.#showTexture(by === "texture");
   }
@@ -178,9 +208,9 @@ export class Surface {
   #showTexture(isOn: boolean): void {
     if (!this.#textured || isOn === this.#isTextured) return;
     this.#textured.object.visible = isOn;
-    this.#plain.visible = !isOn;
+    this.#showPlain();
     if (!isOn) return;
-    this.#textured.move(this.#draw);
+    this.#textured.move(this.#at);
     this.#textured.pull(this.#pulls);
   }
 
@@ -195,6 +225,7 @@ export class Surface {
 
   dispose(): void {
     this.#geometry.dispose();
+    this.#sender.geometry.dispose();
     this.#wire.geometry.dispose();
     this.#ghost.geometry.dispose();
     for (const { material } of [this.#wire, this.#ghost]) (material as three.Material).dispose();
@@ -206,7 +237,7 @@ export class Surface {
   #findEdges(): void {
     const { geometry } = this.#wire;
     if (geometry.index) return;
-    const { indices, source } = this.#draw;
+    const { indices, source } = this.#drawn;
     const lines = new Uint32Array(2 * indices.length);
     const known = new Pairs(indices.length);
     for (let corner = 0; corner < indices.length; ++corner) {
@@ -219,12 +250,15 @@ export class Surface {
     }
     geometry.setIndex(new three.BufferAttribute(lines.slice(0, 2 * known.size), 1));
     geometry.setAttribute("position", this.#geometry.attributes["position"]!);
+    geometry.boundingSphere = this.#geometry.boundingSphere;
   }
 
   #makeGhost(): three.Mesh {
     const geometry = new three.BufferGeometry();
     geometry.setIndex(new three.BufferAttribute(this.mesh.faces, 1));
     geometry.setAttribute("position", new three.BufferAttribute(this.mesh.positions, 3));
+    const { center, diagonal } = this.#derived.bounds;
+    geometry.boundingSphere = new three.Sphere(new three.Vector3(...center), diagonal / 2);
     const material = new three.MeshBasicMaterial({
       transparent: true,
       opacity: 0.13,

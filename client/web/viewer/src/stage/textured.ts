@@ -1,5 +1,5 @@
 import * as three from "three";
-import { Pairs } from "../model/pairs.js";
+import { Pairs } from "lpdeform-client/mesh/pairs";
 import type { Texturing, TextureLayer } from "../model/texturing.js";
 
 /** What is drawn of a surface, as DrawMesh has it. */

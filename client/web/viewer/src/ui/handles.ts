@@ -2,7 +2,7 @@ import type { Hold } from "lpdeform-client";
 import type { App } from "../app/app.js";
 import { changeHandle, type Handle, handleOf } from "../model/document.js";
 import { type HoldKind, holdKinds, kindOf } from "../model/hold_kinds.js";
-import type { Vector3 } from "../model/mesh.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
 import { atRest, isAtRest } from "../model/pose.js";
 import { short } from "../model/words.js";
 import { el } from "./dom.js";

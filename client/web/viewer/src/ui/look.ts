@@ -69,7 +69,9 @@ export function lookPanel(app: App): HTMLElement {
     ({ mesh }) => [mesh],
     () => {
       texture.disabled = !app.isTextured;
-      texture.title = app.isTextured ? "" : "A GLB or glTF with materials has textures";
+      texture.title = app.isTextured
+        ? ""
+        : "A GLB or glTF with materials has textures, and an OBJ that is opened together with its MTL and images";
     },
   );
   return el(

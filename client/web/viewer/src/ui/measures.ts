@@ -2,7 +2,7 @@ import type { App } from "../app/app.js";
 import type { Pane } from "../app/pane.js";
 import { placeOf } from "../app/sides.js";
 import { colourIn } from "../model/palettes.js";
-import { histogram } from "../model/statistics.js";
+import { histogram } from "lpdeform-client/mesh/statistics";
 import { lowerText, short } from "../model/words.js";
 import { el, setText } from "./dom.js";
 import { plotBars, plotLines } from "./plot.js";

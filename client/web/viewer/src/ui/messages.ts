@@ -136,7 +136,7 @@ function asideNote(app: App): HTMLElement {
   const which = el("select", { aria: { label: "Work that was set aside" } });
   const back = el("button", { type: "button", className: "plain", textContent: "Bring it back" });
   const dismiss = el("button", { type: "button", className: "plain", textContent: "Dismiss" });
-  back.addEventListener("click", () => app.bringBack(Number(which.value)));
+  back.addEventListener("click", () => void app.bringBack(Number(which.value)));
   dismiss.addEventListener("click", () => app.dismissAside(Number(which.value)));
   const note = el("div", { className: "aside", role: "status", hidden: true }, text, which, back, dismiss);
   app.facts.watch(

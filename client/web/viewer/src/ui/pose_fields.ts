@@ -2,7 +2,7 @@ import type { App } from "../app/app.js";
 import { anchorOfHandle, changeHandle, type Document, type Handle, handleOf, shifted } from "../model/document.js";
 import { fromEuler, toEuler } from "../model/euler.js";
 import { kindOf } from "../model/hold_kinds.js";
-import type { Vector3 } from "../model/mesh.js";
+import type { Vector3 } from "lpdeform-client/mesh/mesh";
 import { leastScale, mostScale, noScale, scaled, subtract } from "../model/pose.js";
 import { el } from "./dom.js";
 import { type NumberField, numberField } from "./number_field.js";

@@ -1,9 +1,10 @@
 import type { Defect, MeshReport } from "lpdeform-client";
 import type { App } from "../app/app.js";
 import { elementsIn } from "../link/status.js";
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { cornersOf, nothing, type PointedOut, within } from "../model/pointed.js";
 import { el, setText, toggle } from "./dom.js";
+import { short } from "../model/words.js";
 import { icon } from "./icons.js";
 
 /** The elements of a defect: the numbers in its list are vertices, faces, or pairs of vertices. */
@@ -14,6 +15,9 @@ function elementOf(kind: string): Element {
   if (kind.includes("edge") || kind === "inconsistent_orientation") return "edge";
   return /face|triangle/.test(kind) ? "face" : "vertex";
 }
+
+/** Shares of the diagonal that are offered; the second is the server's own. */
+const tolerances = [0, 1e-6, 1e-5, 1e-4, 1e-3];
 
 /** Defects that the server handles by itself, and that most meshes have some of. */
 const mild = new Set(["clamped_edges", "floored_vertices", "flipped_edges"]);
@@ -35,21 +39,38 @@ export function reportPanel(app: App): HTMLElement {
   const weld = toggle(
     "Weld seams",
     true,
-    (isWelded) => app.weld(isWelded),
+    (isOn) => void app.weld({ tolerance: app.view.now.weldTolerance, isOn }),
     "Vertices in one place on open borders move as one; saved files have them all",
   );
-  const seamBox = el("div", { className: "seams", hidden: true }, seams, weld.element);
+  const reach = el("select", { aria: { label: "How far apart welded vertices may be" } });
+  for (const tolerance of tolerances) {
+    const text = tolerance === 0 ? "in exactly one place" : `${short(100 * tolerance)} % of the size`;
+    reach.append(el("option", { value: String(tolerance), textContent: text }));
+  }
+  reach.title =
+    "Vertices on open borders that are no farther apart count as one; the size is the diagonal of the mesh's bounds";
+  reach.addEventListener("change", () => {
+    const isOn = app.view.now.isWelded;
+    void app.weld({ tolerance: Number(reach.value), isOn }).then(showSeams); // also what holds if it is refused
+  });
+  const tolerance = el("label", { className: "pair" }, el("span", {}, "Weld within"), reach);
+  const seamBox = el("div", { className: "seams", hidden: true }, seams, weld.element, tolerance);
   const showSeams = () => {
-    const { seamVertices } = app.facts.now;
-    const { isWelded } = app.view.now;
+    const { seamVertices, report } = app.facts.now;
+    const { isWelded, weldTolerance } = app.view.now;
+    const hasSeams = seamVertices > 0;
     weld.input.checked = isWelded;
-    seamBox.hidden = seamVertices === 0;
-    seamBox.classList.toggle("torn", !isWelded);
+    reach.value = String(weldTolerance);
+    seamBox.hidden = !hasSeams && !((report?.boundaryLoops ?? 0) > 0); // nothing lies open
+    weld.element.hidden = !hasSeams;
+    tolerance.hidden = !isWelded;
+    seamBox.classList.toggle("torn", hasSeams && !isWelded);
+    if (!hasSeams) return setText(seams, "No vertices of its open borders lie on others.");
     const copies = seamVertices === 1 ? "vertex lies on another" : "vertices lie on others";
     const fate = isWelded ? "They move as one." : "The surface tears there.";
     setText(seams, `${seamVertices.toLocaleString("en")} ${copies} along seams of textures or normals. ${fate}`);
   };
-  app.facts.watch(({ seamVertices }) => [seamVertices], showSeams);
+  app.facts.watch(({ seamVertices, report }) => [seamVertices, report], showSeams);
   app.view.watchAll(showSeams);
   const showReport = (report: MeshReport | undefined, { name }: Mesh) => {
     const defects = defectsOf(report);

@@ -1,4 +1,5 @@
 import type { App } from "../app/app.js";
+import { paintFolds } from "../app/paint_folds.js";
 import { withoutPaint } from "../model/document.js";
 import { nothing } from "../model/pointed.js";
 import type { PaintMode } from "../model/soft_paint.js";
@@ -90,6 +91,9 @@ function options(app: App): HTMLElement {
   );
   const clear = el("button", { type: "button", className: "plain", textContent: "Clear painting" });
   clear.addEventListener("click", () => app.change(withoutPaint(app.document)));
+  const folds = el("button", { type: "button", className: "plain", textContent: "Paint folds" });
+  folds.title = "Bring the value on where the surface bends within the brush's size, less and less towards flat places";
+  folds.addEventListener("click", () => paintFolds(app));
   const moving = gizmoOptions(app);
   const element = el(
     "div",
@@ -105,6 +109,7 @@ function options(app: App): HTMLElement {
     stiffness.element,
     through.element,
     symmetryChoice(app),
+    folds,
     clear,
   );
 
@@ -125,6 +130,7 @@ function options(app: App): HTMLElement {
     gizmo.element.hidden = moving.hidden = tool !== "move";
     mode.element.hidden = tool === "paint" || tool === "move";
     field.element.hidden = painting.element.hidden = soft.element.hidden = clear.hidden = tool !== "paint";
+    folds.hidden = tool !== "paint" || view.paintMode !== "set";
     size.element.hidden = tool === "lasso" || tool === "box";
     p.element.hidden = tool !== "paint" || view.paintField !== "p" || view.paintMode !== "set";
     stiffness.element.hidden = tool !== "paint" || view.paintField !== "stiffness" || view.paintMode !== "set";

@@ -1,23 +1,25 @@
 // How long the viewer keeps the page's main thread busy without a break, at 100,000 vertices and more: npm run blocks.
-// SECONDS (default 8) of each drag; FILES: the folder of another build of the page. Measures, does not judge.
-import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
+// SECONDS (default 8) of each drag; FILES: the folder of another build of the page; PROFILE: says what the longest tasks did, "all" with
+// functions, which makes them longer, or "events". Measures, does not judge.
+import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { afterAll, beforeAll, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
-import { percentile } from "../../src/model/statistics.js";
-import { launch, User } from "../real/user.js";
+import { percentile } from "lpdeform-client/mesh/statistics";
+import { chromium, type Browser } from "playwright-core";
+import { launch } from "../real/user.js";
 import { ringObj, ringVertex } from "../support/ring.js";
-import { longestByMark, type Task, Trace } from "./trace.js";
+import { args, BarePage, stir } from "../real/bare_page.js";
+import { tasksByMark, type Task, Trace } from "./trace.js";
 
 const seconds = Number(process.env["SECONDS"] ?? 8);
 const [around, across] = [460, 218]; // 100,280 vertices
 const [largeAround, largeAcross] = [620, 280]; // 173,600 vertices
-const blocks = ["what", "steps", "median", "p95", "longest", "computed: median", "p95", "longest"].map(String);
+const blocks = ["what", "steps", "computed: median", "p95", "longest", "by the clock: median", "p95", "longest"].map(String);
+const profile = process.env["PROFILE"] as "all" | "events" | undefined;
 const table: string[][] = [blocks];
 const notes: string[] = [];
-// The processor draws here, but in a process of its own, as a graphics card would: the page does not wait for its pictures.
-const args = launch.args.filter((flag) => flag !== "--disable-gpu-compositing");
 const folder = mkdtempSync(join(tmpdir(), "lpdeform-blocks-"));
 let service: Service;
 
@@ -32,7 +34,8 @@ afterAll(async () => {
   const lines = table.map((row) => row.map((cell, k) => (k ? cell.padStart(widths[k]!) : cell.padEnd(widths[k]!))).join("  "));
   console.log(
     [
-      "The longest task of the main thread in each step, in ms: by the clock, and what the thread computed in it.",
+      "The longest task of the main thread in each step, in ms: by what the thread computed in it, and by the clock, which goes on while",
+      "the thread waits for the GPU's process, where the processor draws here, and while other programs have the processor.",
       ...lines,
       "",
       ...notes,
@@ -40,61 +43,53 @@ afterAll(async () => {
   );
 });
 
-function note(what: string, tasks: readonly Task[]): void {
+/** `steps`: the tasks of each. */
+function note(what: string, steps: readonly (readonly Task[])[]): void {
+  const longest = (key: "wall" | "cpu") => steps.map((tasks) => Math.max(...tasks.map((task) => task[key])));
   const cells = (numbers: number[]) => [0.5, 0.95, 1].map((share) => percentile(numbers, share).toFixed(1));
-  const [walls, cpus] = [tasks.map(({ wall }) => wall), tasks.map(({ cpu }) => cpu)];
-  table.push([what, String(tasks.length), ...cells(walls), ...cells(cpus)]);
+  table.push([what, String(steps.length), ...cells(longest("cpu")), ...cells(longest("wall"))]);
 }
 
-/** By its path: a file that a test sends to the page keeps the page busy. */
-async function openFile(user: User, text: string): Promise<void> {
-  const path = join(folder, "ring.obj");
-  writeFileSync(path, text);
-  const chooser = user.page.waitForEvent("filechooser");
-  await user.page.getByRole("button", { name: "Open" }).click();
-  await (await chooser).setFiles(path);
-}
-
-async function opened(text: string): Promise<User> {
-  const user = await User.open(`${service.url}/?shape=sheet&detail=coarse`, { args });
-  await user.settled();
-  await openFile(user, text);
-  await user.until(`window.__lpdeform.app.mesh.name === "ring.obj" && window.__lpdeform.status() === "live"`);
-  return user;
-}
-
-async function clickVertex(user: User, turn: number, roll: number): Promise<void> {
-  const { x, y } = await user.vertexOnPage(ringVertex(around, across, turn, roll));
-  await user.page.mouse.click(x, y);
-}
-
-/** Moves the pointer for some time, about sixty times a second. */
-async function stir(user: User, { x, y }: { x: number; y: number }): Promise<void> {
-  const begin = performance.now();
-  for (let now = 0; now < 1000 * seconds; now = performance.now() - begin) {
-    await user.page.mouse.move(x + 60 * Math.sin(now / 500), y + 25 * (1 - Math.cos(now / 400)));
-    await new Promise((again) => setTimeout(again, 16));
+function sayLongest(what: string, tasks: readonly Task[], trace: Trace): void {
+  if (!profile) return;
+  for (const task of [...tasks].sort((a, b) => b.cpu - a.cpu).slice(0, 5)) {
+    console.log([`${what}: ${task.wall.toFixed(1)} ms, computed ${task.cpu.toFixed(1)}`, ...trace.what(task)].join("\n"));
   }
 }
+
+const bare = (browser: Browser) => BarePage.open(browser, `${service.url}/?shape=sheet&detail=coarse`);
+const openFile = (page: BarePage, text: string) => page.openText(join(folder, "ring.obj"), text);
+
+async function opened(text: string): Promise<{ browser: Browser; page: BarePage }> {
+  const browser = await chromium.launch({ ...launch, args });
+  const page = await bare(browser);
+  await page.settled();
+  await openFile(page, text);
+  await page.until(`window.__lpdeform.app.mesh.name === "ring.obj" && window.__lpdeform.status() === "live"`);
+  return { browser, page };
+}
+
+const vertexOnPage = (page: BarePage, turn: number, roll: number) =>
+  page.ask<{ x: number; y: number }>(`vertexOnPage(${ringVertex(around, across, turn, roll)})`);
 
 it(
   "a drag",
   async () => {
-    const user = await opened(ringObj(around, across));
-    await clickVertex(user, 0.62, 0.2);
-    await clickVertex(user, 0.88, 0.2);
-    await user.settled();
-    await user.page.evaluate(watchDrag);
-    const at = await user.vertexOnPage(ringVertex(around, across, 0.88, 0.2));
-    const trace = await Trace.start(user.browser);
-    await user.page.mouse.move(at.x, at.y);
-    await user.page.mouse.down();
-    await stir(user, at);
+    const { browser, page } = await opened(ringObj(around, across));
+    for (const turn of [0.62, 0.88]) await page.click(await vertexOnPage(page, turn, 0.2));
+    await page.settled();
+    await page.evaluate(`(${watchDrag.toString()})()`);
+    const at = await vertexOnPage(page, 0.88, 0.2);
+    const trace = await Trace.start(browser, profile);
+    await page.mouse("mouseMoved", at.x, at.y);
+    await page.mouse("mousePressed", at.x, at.y);
+    await stir(page, at, seconds);
     const { tasks, marks } = await trace.stop("frame-taken");
-    const watched = (await user.page.evaluate("window.__drag")) as { gaps: number[]; pictures: number; seconds: number };
-    await user.page.mouse.up();
-    await user.close();
-    note("drag: intake of a frame", longestByMark(tasks, marks, "before"));
+    const watched = await page.evaluate<{ gaps: number[]; pictures: number; seconds: number }>("window.__drag");
+    await page.mouse("mouseReleased", at.x, at.y);
+    await browser.close();
+    note("drag: intake of a frame", tasksByMark(tasks, marks, "before"));
+    sayLongest("drag", tasks, trace);
     const gaps = [0.5, 0.95].map((share) => percentile(watched.gaps, share).toFixed(1)).join(" and ");
     const rate = (count: number) => (count / watched.seconds).toFixed(1);
     notes.push(
@@ -106,7 +101,7 @@ it(
 
 /** Marks each frame that is taken, and measures in each picture how far the surface is from where the handle is. */
 function watchDrag(): void {
-  const { app, pointOnPage, vertexOnPage } = (window as any).__lpdeform;
+  const { app, pointOnPage } = (window as any).__lpdeform;
   const [pane] = app.panes;
   const take = pane.takeFrame.bind(pane);
   pane.takeFrame = () => {
@@ -125,33 +120,35 @@ function watchDrag(): void {
     ++drag.pictures;
     const [vertex] = vertices;
     const rest = app.mesh.positions.slice(3 * vertex, 3 * vertex + 3);
-    const wanted = pointOnPage([0, 1, 2].map((axis) => rest[axis] + pose.translation[axis]));
-    const drawn = vertexOnPage(vertex);
-    drag.gaps.push(Math.hypot(wanted.x - drawn.x, wanted.y - drawn.y));
+    const places = [[0, 1, 2].map((axis) => rest[axis] + pose.translation[axis]), pane.stage.surface.placeOf(vertex).toArray()];
+    // In a task of its own, because it is not the page's.
+    setTimeout(() => {
+      const [wanted, drawn] = places.map((place) => pointOnPage(place));
+      drag.gaps.push(Math.hypot(wanted.x - drawn.x, wanted.y - drawn.y));
+    });
   });
 }
 
 it(
   "a brush's stroke",
   async () => {
-    const user = await opened(ringObj(around, across));
-    await clickVertex(user, 0.62, 0.2);
-    await user.page.evaluate(() => {
-      window.addEventListener("pointermove", () => performance.mark("brush-step"), { capture: true });
-    });
+    const { browser, page } = await opened(ringObj(around, across));
+    await page.click(await vertexOnPage(page, 0.62, 0.2));
+    await page.evaluate(`addEventListener("pointermove", () => performance.mark("brush-step"), { capture: true })`);
     for (const tool of ["brush", "paint"]) {
-      await user.ask(`app.view.set({ tool: "${tool}", radius: 0.05 })`);
-      await user.settled();
-      const at = await user.vertexOnPage(ringVertex(around, across, 0.8, 0.2));
-      await user.page.mouse.move(at.x, at.y);
-      const trace = await Trace.start(user.browser);
-      await user.page.mouse.down();
-      await stir(user, at);
+      await page.ask(`app.view.set({ tool: "${tool}", radius: 0.05 })`);
+      await page.settled();
+      const at = await vertexOnPage(page, 0.8, 0.2);
+      await page.mouse("mouseMoved", at.x, at.y);
+      const trace = await Trace.start(browser, profile);
+      await page.mouse("mousePressed", at.x, at.y);
+      await stir(page, at, seconds);
       const { tasks, marks } = await trace.stop("brush-step");
-      await user.page.mouse.up();
-      note(`${tool}: a step of a stroke`, longestByMark(tasks, marks, "after"));
+      await page.mouse("mouseReleased", at.x, at.y);
+      note(`${tool}: a step of a stroke`, tasksByMark(tasks, marks, "after"));
+      sayLongest(tool, tasks, trace);
     }
-    await user.close();
+    await browser.close();
   },
   (10 * seconds + 120) * 1000,
 );
@@ -160,30 +157,32 @@ it.each([
   [around, across],
   [largeAround, largeAcross],
 ])(
-  "opening an OBJ file",
+  "opening an OBJ file of %d by %d",
   async (one, other) => {
     const text = ringObj(one, other);
-    const longest: Task[] = [];
+    const openings: Task[][] = [];
     const waits: number[] = [];
     for (let time = 0; time < 3; ++time) {
-      const user = await User.open(`${service.url}/?shape=sheet&detail=coarse`, { args });
-      await user.settled();
-      await user.page.evaluate(() => {
-        document.querySelector("#app")!.addEventListener("click", () => performance.mark("opening"), { capture: true });
-      });
-      const trace = await Trace.start(user.browser);
+      const browser = await chromium.launch({ ...launch, args });
+      const page = await bare(browser);
+      await page.settled();
+      await page.evaluate(
+        `document.querySelector("#app").addEventListener("click", () => performance.mark("opening"), { capture: true })`,
+      );
+      const trace = await Trace.start(browser, profile);
       const begin = performance.now();
-      await openFile(user, text);
-      await user.until(`window.__lpdeform.app.mesh.name === "ring.obj"`);
+      await openFile(page, text);
+      await page.until(`window.__lpdeform.app.mesh.name === "ring.obj"`);
       waits.push(performance.now() - begin);
-      await user.until(`window.__lpdeform.status() === "live"`);
+      await page.until(`window.__lpdeform.status() === "live"`);
       await new Promise((again) => setTimeout(again, 1500)); // what the page keeps for later
       const { tasks } = await trace.stop("opening");
-      longest.push(tasks.reduce((most, task) => (task.wall > most.wall ? task : most)));
-      await user.close();
+      openings.push(tasks);
+      sayLongest("opening", tasks, trace);
+      await browser.close();
     }
     const name = `opening ${(one * other).toLocaleString("en")} vertices`;
-    note(name, longest);
+    note(name, openings);
     notes.push(`${name}: the mesh is there after ${percentile(waits, 0.5).toFixed(0)} ms.`);
   },
   300_000,

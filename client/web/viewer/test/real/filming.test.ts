@@ -1,6 +1,6 @@
 import { writeFileSync } from "node:fs";
 import { beforeAll, expect, it } from "vitest";
-import { readGltfDocument } from "../../src/io/gltf_document.js";
+import { readGltfDocument } from "lpdeform-client/mesh/gltf_document";
 import { faultsOf } from "../gltf_validator.js";
 import { columns, makeGlb, rows } from "../made_glb.js";
 import { bar, withUser } from "./opened.js";
@@ -50,6 +50,18 @@ it("poses are exported as morph targets, solved in between, and validated", asyn
   const farthest = primitives[0].targets.map(({ POSITION }) => accessors[POSITION]!.max[0]!);
   expect(farthest).toEqual([...farthest].sort((a, b) => a - b));
   expect(farthest.at(-1)).toBeGreaterThan(0.5);
+});
+
+it("Escape ends the recording of a video, and the picture shows the work again", async () => {
+  await user.page.getByRole("button", { name: "Save" }).click();
+  await user.page.getByRole("menuitem", { name: "Poses as video" }).click();
+  await user.page.locator(".notice", { hasText: "Recording the poses… Escape stops it." }).waitFor();
+  const downloads: string[] = [];
+  user.page.on("download", (one) => downloads.push(one.suggestedFilename()));
+  await user.page.keyboard.press("Escape");
+  await user.page.locator(".notice.bad", { hasText: "The poses were not exported. Escape was pressed." }).waitFor();
+  expect(downloads).toEqual([]);
+  await user.settled();
 });
 
 it("poses are recorded as a video of the picture, whose last picture is the last pose", async () => {

@@ -5,7 +5,7 @@ import { type Page } from "playwright-core";
 import { build } from "vite";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
-import { readMesh } from "../../src/io/read.js";
+import { parseMesh } from "lpdeform-client/mesh/read";
 import { faultsOf } from "../gltf_validator.js";
 import { columns, make3mf, makeBinaryFbx, makeDae, makeFbx } from "../made_foreign.js";
 import { User } from "./user.js";
@@ -69,7 +69,7 @@ describe("the viewer", () => {
       await user.settled();
       const saved = new Uint8Array(await user.save("Mesh as GLB"));
       expect(await faultsOf(saved)).toEqual([]);
-      const bent = readMesh("a.glb", saved);
+      const bent = parseMesh("a.glb", saved);
       const top = where(13).map((v) => bent.positions[3 * v]!);
       expect((Math.min(...top) + Math.max(...top)) / 2).toBeCloseTo(2, 3);
       expect(new Set(where(13).map((v) => bent.positions.subarray(3 * v, 3 * v + 3).join())).size).toBe(columns);

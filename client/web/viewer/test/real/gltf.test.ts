@@ -5,8 +5,8 @@ import { join } from "node:path";
 import { promisify } from "node:util";
 import { afterAll, beforeAll, expect, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
-import { readGltfDocument } from "../../src/io/gltf_document.js";
-import { readMesh } from "../../src/io/read.js";
+import { readGltfDocument } from "lpdeform-client/mesh/gltf_document";
+import { parseMesh } from "lpdeform-client/mesh/read";
 import { faultsOf } from "../gltf_validator.js";
 import { columns, makeGlb, rows } from "../made_glb.js";
 import { User } from "./user.js";
@@ -47,7 +47,7 @@ it.each(["glb", "gltf"])("the command line writes .%s files that the Khronos val
   const bent = new Uint8Array(await readFile(at(`bent.${ending}`)));
   expect(await faultsOf(bent)).toEqual([]);
   expect(await faultsOf(new Uint8Array(await readFile(at(`bar.${ending}`))))).toEqual([]);
-  const [before, after] = [readMesh("a.glb", makeGlb()).positions, readMesh(`a.${ending}`, bent).positions];
+  const [before, after] = [parseMesh("a.glb", makeGlb()).positions, parseMesh(`a.${ending}`, bent).positions];
   const far = row(rows).map((v) => after[3 * v]! - before[3 * v]!);
   for (const way of far) expect(way).toBeCloseTo(1, 5);
 });
@@ -58,7 +58,7 @@ it("a GLB that is opened in the page, bent and saved has everything that it had"
   await user.settled();
   const saved = new Uint8Array(await user.save("Mesh as GLB"));
   expect(await faultsOf(saved)).toEqual([]);
-  const [before, after] = [readMesh("a.glb", makeGlb(true)), readMesh("a.glb", saved)];
+  const [before, after] = [parseMesh("a.glb", makeGlb(true)), parseMesh("a.glb", saved)];
   expect(after.faces).toEqual(before.faces);
   for (const v of row(rows)) expect(after.positions[3 * v]! - before.positions[3 * v]!).toBeCloseTo(1, 5);
   for (let k = 0; k <= rows; ++k) {

@@ -38,7 +38,7 @@ it.each([true, false])("follows a handle between frames; with workers: %s", asyn
   }
   await user.settled();
   const workers = user.page.workers().map((worker) => /\/(\w+)_worker/.exec(worker.url())![1]);
-  expect(workers.sort()).toEqual(hasWorkers ? ["intake", "unpack"] : []); // the one that has read the file has ended
+  expect(workers.sort()).toEqual(hasWorkers ? ["mesh"] : []); // it has read the file, too
   const [from, far] = await Promise.all([onRing(0.88), onRing(0.4)]);
 
   // No frame is taken: what moves is ahead of them.
@@ -73,6 +73,36 @@ it.each([true, false])("follows a handle between frames; with workers: %s", asyn
     ...[0, 0, 1, 0],
     ...[0, 0, 0, 1],
   ]);
+  expect(user.errors).toEqual([]);
+  await user.close();
+});
+
+it("comes back after a reload as one block of bytes, with its handle and the file that it came from", async () => {
+  const user = await User.open(`${service.url}/?shape=sheet&detail=coarse`);
+  await user.settled();
+  await user.openFiles({ name: "ring.obj", content: ringObj(around, across) });
+  await user.until(`window.__lpdeform.app.mesh.name === "ring.obj"`);
+  const { x, y } = await user.vertexOnPage(ringVertex(around, across, 0.62, 0.2));
+  await user.page.mouse.click(x, y);
+  const kept = `(async () => {
+    const database = await new Promise((done) => {
+      const request = indexedDB.open("lpdeform");
+      request.onsuccess = () => done(request.result);
+    });
+    const all = database.transaction("meshes").objectStore("meshes").getAll();
+    await new Promise((done) => (all.onsuccess = done));
+    return all.result.map((mesh) => mesh.blob?.size ?? 0);
+  })()`;
+  await expect.poll(() => user.page.evaluate(kept)).toHaveLength(1);
+  const [size] = (await user.page.evaluate(kept)) as number[];
+  expect(size).toBeGreaterThan(12 * 3 * around * across);
+  const before = await user.page.evaluate(`[...window.__lpdeform.app.mesh.positions.subarray(0, 300)]`);
+  await user.page.reload();
+  await user.until(`window.__lpdeform?.app.mesh.name === "ring.obj"`);
+  expect(await user.page.evaluate(`[...window.__lpdeform.app.mesh.positions.subarray(0, 300)]`)).toEqual(before);
+  expect(await user.ask<number>("app.document.handles.length")).toBe(1);
+  expect(await user.ask<number>("app.mesh.obj.length")).toBe(ringObj(around, across).length);
+  await user.settled();
   expect(user.errors).toEqual([]);
   await user.close();
 });

@@ -2,7 +2,7 @@ import { join } from "node:path";
 import type { BrowserContext } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, expect, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
-import { writeOff } from "../../src/io/off.js";
+import { writeOff } from "../../src/io/write_off.js";
 import { blockSurface } from "../../src/model/block.js";
 import { User } from "./user.js";
 

@@ -1,5 +1,6 @@
 import { beforeAll, expect, it } from "vitest";
-import { readOff, writeOff } from "../../src/io/off.js";
+import { readOff } from "lpdeform-client/mesh/off";
+import { writeOff } from "../../src/io/write_off.js";
 import { splitTube } from "../split_tube.js";
 import { withUser } from "./opened.js";
 import type { User } from "./user.js";
@@ -73,8 +74,11 @@ it("what is saved has the file's own vertices and faces", async () => {
   expect(gapOf(saved.exact ?? saved.positions)).toBe(0);
 });
 
+const openPanel = () =>
+  user.page.locator(".panel details", { hasText: "Weld seams" }).evaluate((one: HTMLDetailsElement) => void (one.open = true));
+
 it("the switch lets the surface tear, and closes it again", async () => {
-  await user.page.locator(".panel summary", { hasText: "Mesh" }).click();
+  await openPanel();
   await weldSwitch().click();
   await notice("The mesh comes apart where it is split"); // as the server has it
   await user.page.locator('[data-warning="split_border_vertices"]').waitFor();
@@ -89,6 +93,32 @@ it("the switch lets the surface tear, and closes it again", async () => {
   await weldSwitch().click();
   await user.until("window.__lpdeform.app.facts.now.report?.weldedVertices > 0");
   expect(await gap()).toBe(0);
+  expect(user.errors).toEqual([]);
+});
+
+it("how far apart welded vertices may be is said, and can be chosen; the choice stays with the work", async () => {
+  const apart = { ...tube, positions: tube.positions.slice() };
+  for (let row = 0; row <= rows; ++row) apart.positions[3 * (row * (columns + 1) + columns)]! += 0.005; // 0.05 % of the size
+  await user.openFiles({ name: "apart.off", content: writeOff(apart) });
+  await openPanel();
+  await user.page.getByText("No vertices of its open borders lie on others.").waitFor();
+  const within = user.page.getByLabel("How far apart welded vertices may be");
+  expect(await within.inputValue()).toBe("0.000001");
+  await within.selectOption("0.1 % of the size");
+  await user.until(`window.__lpdeform.app.facts.now.report?.weldedVertices === ${rows + 1}`);
+  await user.page.getByText(`${rows + 1} vertices lie on others`).waitFor();
+  const { x, y } = await user.vertexOnPage(5 * (columns + 1) + 12);
+  await user.page.mouse.click(x, y); // what was only opened is not kept beside other work
+  await user.until("window.__lpdeform.document().handles.length === 1");
+  await user.settled();
+  await user.page.waitForTimeout(700);
+  await user.page.reload();
+  await user.until("window.__lpdeform?.app.facts.now.report && window.__lpdeform.status() === 'live'");
+  expect(await user.ask("app.facts.now.report.weldedVertices")).toBe(rows + 1);
+  expect(await within.inputValue()).toBe("0.001");
+  await openPanel();
+  await within.selectOption("in exactly one place");
+  await user.until("window.__lpdeform.app.facts.now.report?.weldedVertices === 0");
   expect(user.errors).toEqual([]);
 });
 

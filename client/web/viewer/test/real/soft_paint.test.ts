@@ -50,3 +50,19 @@ it("a soft brush blends, is seen while it paints, and is cancelled by Escape; sm
   await page.keyboard.press("Control+z");
   expect(await painted()).toEqual(smooth);
 });
+
+it("folds are painted in one step, more where the surface bends more, and nothing where it is flat", async () => {
+  await user.page.keyboard.press("e");
+  await user.ask("app.view.set({ paintP: 8, radius: 0.05 })");
+  await user.page.getByRole("button", { name: "Paint folds" }).click();
+  const at = async (place: [number, number, number]) => {
+    const value = await user.ask<number>(`document().paintedP[${await user.vertexNear(place)}]`);
+    return Number.isNaN(value) ? undefined : value;
+  };
+  expect(await at([10, 10, 5])).toBeGreaterThan(2); // an edge of the bar
+  expect((await painted()).at(-1)).toBeLessThanOrEqual(8);
+  expect(await user.ask("app.view.now.colourBy")).toBe("p");
+  await user.settled();
+  await user.page.keyboard.press("Control+z");
+  expect(await painted()).toEqual([]);
+});

@@ -72,3 +72,51 @@ it("the texture of a GLB is shown where the file has it, and bends with the surf
   await user.ask(`app.openShape("sheet", "coarse")`);
   expect(await user.ask("app.view.now.colourBy")).toBe("distortion");
 });
+
+it("the images of an OBJ are shown if they are opened with it and its MTL, also after a reload; one that is missing is named", async () => {
+  const [across, along] = [8, 8];
+  const lines = ["mtllib sheet.mtl", "usemtl picture"];
+  for (let row = 0; row <= along; ++row) {
+    for (let column = 0; column <= across; ++column) {
+      lines.push(`v ${column} 0 ${row}`, `vt ${column / across} ${row / along}`);
+    }
+  }
+  for (let row = 0; row < along; ++row) {
+    for (let column = 1; column <= across; ++column) {
+      const [a, b] = [row * (across + 1) + column, (row + 1) * (across + 1) + column];
+      lines.push(`f ${a}/${a} ${a + 1}/${a + 1} ${b + 1}/${b + 1} ${b}/${b}`);
+    }
+  }
+  const sheet = { name: "sheet.obj", content: `${lines.join("\n")}\n` };
+  const mtl = { name: "sheet.mtl", content: "newmtl picture\nKd 1 1 1\nmap_Kd -clamp on maps/picture.png\n" };
+  await user.openFiles(sheet, mtl);
+  await user.until(`window.__lpdeform.app.mesh.name === "sheet.obj"`);
+  await button("Texture").click();
+  await user.page
+    .locator(".notice", { hasText: "Open these images together with sheet.obj to see them: maps/picture.png" })
+    .waitFor();
+  await button("Distortion").click();
+  await user.openFiles(sheet, mtl, { name: "picture.png", content: Buffer.from(pngOf(2, 1, [255, 0, 0, 0, 255, 0])) });
+  await user.until(`Object.keys(window.__lpdeform.app.mesh.materials ?? {}).length === 2`);
+  await user.ask("app.view.set({ isYUp: false })");
+  await button("Texture").click();
+  await button("Front").click();
+  const at = (column: number) => user.vertexOnPage(4 * (across + 1) + column);
+  const shown = async () => {
+    await user.page.mouse.move(5, 400);
+    await expect.poll(async () => isRed(await user.colourAt(await at(2))), { timeout: 20_000 }).toBe(true);
+    await expect.poll(async () => isGreen(await user.colourAt(await at(6))), { timeout: 20_000 }).toBe(true);
+  };
+  await shown();
+  const { x, y } = await at(4);
+  await user.page.locator("canvas.stage").focus();
+  await user.page.keyboard.press("1");
+  await user.page.mouse.click(x, y);
+  await user.until("window.__lpdeform.document().handles.length === 1");
+  await user.page.waitForTimeout(700);
+  await user.page.reload();
+  await user.until(`window.__lpdeform?.app.mesh.name === "sheet.obj"`);
+  expect(await user.ask("app.view.now.colourBy")).toBe("texture");
+  await shown();
+  expect(user.errors).toEqual([]);
+});

@@ -1,3 +1,4 @@
+import { joinSession, type LpdeformError } from "lpdeform-client";
 import { expect, it } from "vitest";
 import type { Service } from "../../../client/test/support/service.js";
 import { bar, withUser } from "./opened.js";
@@ -62,6 +63,22 @@ it("a link shows others the shape as it is and as it changes, and they change no
   await user.ask(`app.openShape("sheet", "coarse")`);
   await one.page.getByRole("alert").getByText("This session has ended").waitFor({ timeout: 60_000 });
   await close(one);
+});
+
+it("a page that is left for good takes its session with it", async () => {
+  const leaving = await User.open(`${service.url}${bar}`);
+  await leaving.settled();
+  const name = await leaving.ask<string>("app.panes[0].live.sessionName");
+  const { url } = service;
+  const code = () =>
+    joinSession(name, { url }).then(
+      () => "there",
+      (error: LpdeformError) => error.code,
+    );
+  expect(await code()).toBe("there");
+  await leaving.page.goto("about:blank");
+  await expect.poll(code, { timeout: 5000 }).toBe("not_found");
+  await leaving.close();
 });
 
 it("a link that is opened while the server is away shows the shape once it is back", async () => {

@@ -4,7 +4,7 @@ import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { afterAll, beforeAll, expect, it } from "vitest";
 import { root } from "../../../client/test/support/service.js";
-import { readMesh } from "../../src/io/read.js";
+import { parseMesh } from "lpdeform-client/mesh/read";
 import { faultsOf } from "../gltf_validator.js";
 import { columns, makeGlb, rows } from "../made_glb.js";
 import { User } from "../real/user.js";
@@ -103,7 +103,7 @@ it("bends a model of their own within a minute of opening the page, led by what 
     saved = await user.save("Mesh as GLB");
   });
   expect(await faultsOf(new Uint8Array(saved!))).toEqual([]);
-  const mesh = readMesh("a.glb", new Uint8Array(saved!));
+  const mesh = parseMesh("a.glb", new Uint8Array(saved!));
   expect(Math.abs(mesh.positions[3 * row(rows)[0]!]! - after[3 * row(rows)[0]!]!)).toBeLessThan(1e-3);
   expect(user.errors).toEqual([]);
 });

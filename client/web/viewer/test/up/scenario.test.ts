@@ -1,9 +1,9 @@
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import { resultIn } from "../../../client/test/support/grpc_web.js";
-import { readMesh } from "../../src/io/read.js";
-import { writeOff } from "../../src/io/off.js";
+import { parseMesh } from "lpdeform-client/mesh/read";
+import { writeOff } from "../../src/io/write_off.js";
 import { blockSurface } from "../../src/model/block.js";
-import type { Mesh, Vector3 } from "../../src/model/mesh.js";
+import type { Mesh, Vector3 } from "lpdeform-client/mesh/mesh";
 import { apply, type Pose } from "../../src/model/pose.js";
 import { User } from "../real/user.js";
 import { Up } from "./up.js";
@@ -152,7 +152,7 @@ describe("somebody with a mesh of their own", () => {
     if (format === "STL") expect(numbersOf(file)).toEqual([...tower.faces].flatMap(at).map(asWritten));
     else expect(numbersOf(file)).toEqual([...positions]);
     if (numbersOf === fromPly) expect(fromPly(file, 3, 1)).toEqual([...distortion]);
-    expect(readMesh(`x.${format.slice(0, 3).toLowerCase()}`, file).faces.length).toBe(tower.faces.length);
+    expect(parseMesh(`x.${format.slice(0, 3).toLowerCase()}`, file).faces.length).toBe(tower.faces.length);
 
     // They are those of what is shown, and handles are where they were put, the one at rest to the last bit.
     expect(largestDifference([...positions], await user.positions())).toBeLessThan(0.02);
@@ -212,7 +212,7 @@ describe("somebody with a mesh of their own", () => {
     await user.until('window.__lpdeform.status() === "away"');
     const shown = await user.positions();
     const file = await user.save("Mesh as OFF");
-    expect([...readMesh("x.off", file).positions]).toEqual(shown);
+    expect([...parseMesh("x.off", file).positions]).toEqual(shown);
     await user.page
       .locator(".notice.bad", { hasText: "What is shown was written as it is, rounded for the screen." })
       .waitFor();

@@ -1,7 +1,7 @@
 // Converts files without the viewer around it.
-import { FileFault } from "../../../src/io/fault.js";
+import { FileFault } from "lpdeform-client/mesh/fault";
 import { glbOf } from "../../../src/io/foreign.js";
-import { meshOf } from "../../../src/io/opened.js";
+import { parseMesh } from "lpdeform-client/mesh/read";
 
 declare global {
   interface Window {
@@ -15,7 +15,7 @@ declare global {
 async function converted(name: string, bytes: Uint8Array<ArrayBuffer>): Promise<string> {
   try {
     const { glb } = await glbOf(new File([bytes], name));
-    return `${(await meshOf(glb, [])).positions.length / 3} vertices`;
+    return `${parseMesh(glb.name, new Uint8Array(await glb.arrayBuffer())).positions.length / 3} vertices`;
   } catch (error) {
     if (error instanceof FileFault) return error.message;
     throw error;

@@ -1,4 +1,14 @@
-import { type GltfDocument, indexOf, listOf, nameOf, type Part, partOf, refuse, viewOf, wholeOf } from "./gltf_document.js";
+import {
+  type GltfDocument,
+  indexOf,
+  listOf,
+  nameOf,
+  type Part,
+  partOf,
+  refuse,
+  viewOf,
+  wholeOf,
+} from "./gltf_document.js";
 
 export const float = 5126;
 const mostElements = 5_000_000;
@@ -70,16 +80,21 @@ export function readNumbers(document: GltfDocument, accessor: number, width: num
   const numbers = new Float64Array(width * layout.count);
   const put = ({ begin, stride, count }: Layout, at: (k: number) => number) => {
     for (let k = 0; k < count; ++k) {
-      for (let axis = 0; axis < width; ++axis) numbers[width * at(k) + axis] = load(view, begin + k * stride + axis * size);
+      for (let axis = 0; axis < width; ++axis)
+        numbers[width * at(k) + axis] = load(view, begin + k * stride + axis * size);
     }
   };
   put(layout, (k) => k);
   if (object["sparse"] !== undefined) {
     const sparse = partOf(object["sparse"]);
     const rows = sparseRows(document, sparse, layout.count, part);
-    put(layoutInView(document, partOf(sparse["values"]), rows.length, width * size, `“sparse” of ${part}`), (k) => rows[k]!);
+    put(
+      layoutInView(document, partOf(sparse["values"]), rows.length, width * size, `“sparse” of ${part}`),
+      (k) => rows[k]!,
+    );
   }
-  if (object["normalized"] === true && one > 1) numbers.forEach((number, k) => (numbers[k] = Math.max(number / one, -1)));
+  if (object["normalized"] === true && one > 1)
+    numbers.forEach((number, k) => (numbers[k] = Math.max(number / one, -1)));
   return numbers;
 }
 

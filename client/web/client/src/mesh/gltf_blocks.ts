@@ -1,6 +1,9 @@
-import { Matrix4, Quaternion, Vector3 } from "three";
+import { mat4, quat, type vec3 } from "gl-matrix";
 import { countOf, readNumbers } from "./gltf_accessors.js";
 import { type GltfDocument, indexOf, listOf, nameOf, type Part, partOf, refuse } from "./gltf_document.js";
+
+/** Sixteen doubles, column by column. */
+export type Placement = number[];
 
 /** Vertices that one node draws: the elements of one set of accessors, which several primitives of its mesh may share. */
 export interface Block {
@@ -11,7 +14,7 @@ export interface Block {
   normal: number | undefined;
   tangent: number | undefined;
   /** From the mesh's coordinates to where it is drawn. */
-  placement: Matrix4;
+  placement: Placement;
   /** Its vertices in the mesh of all blocks. */
   first: number;
   count: number;
@@ -37,6 +40,7 @@ export interface DrawPart {
   faceCount: number;
 }
 
+const identity: Placement = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 const [triangles, strip, fan] = [4, 5, 6];
 const most = 5_000_000;
 
@@ -44,7 +48,9 @@ const most = 5_000_000;
 export function readBlocks(document: GltfDocument): DrawList {
   const { json } = document;
   for (const name of (json["extensionsRequired"] ?? []) as unknown[]) {
-    if (!/_materials_|_texture_|_lights_|_animation_|_audio|_xmp|KHR_mesh_quantization|draco|meshopt/.test(String(name))) {
+    if (
+      !/_materials_|_texture_|_lights_|_animation_|_audio|_xmp|KHR_mesh_quantization|draco|meshopt/.test(String(name))
+    ) {
       refuse(`the extension ${String(name)}`, "is required by the file and not known here");
     }
   }
@@ -62,7 +68,7 @@ export function readBlocks(document: GltfDocument): DrawList {
 }
 
 /** The nodes of the scene, each before its children, with their transforms. */
-function nodesOf(json: Part): Map<number, Matrix4> {
+function nodesOf(json: Part): Map<number, Placement> {
   const nodes = listOf(json, "nodes");
   const childrenOf = (part: Part, key: string, name: string) => {
     const children = part[key] ?? [];
@@ -74,13 +80,13 @@ function nodesOf(json: Part): Map<number, Matrix4> {
   const inner = new Set(nodes.flatMap((node, k) => childrenOf(node, "children", nameOf(json, "nodes", k))));
   const roots =
     scene >= 0 ? childrenOf(scenes[scene]!, "nodes", `scene ${scene}`) : [...nodes.keys()].filter((k) => !inner.has(k));
-  const found = new Map<number, Matrix4>();
-  const open = roots.map((node) => [node, new Matrix4()] as const).reverse();
+  const found = new Map<number, Placement>();
+  const open = roots.map((node) => [node, identity] as const).reverse();
   for (let next = open.pop(); next; next = open.pop()) {
     const [node, above] = next;
     const name = nameOf(json, "nodes", node);
     if (found.has(node)) refuse(name, "is reached twice: nodes must be trees");
-    const toWorld = new Matrix4().multiplyMatrices(above, ownTransform(nodes[node]!, name));
+    const toWorld = product(above, ownTransform(nodes[node]!, name));
     found.set(node, toWorld);
     open.push(
       ...childrenOf(nodes[node]!, "children", name)
@@ -91,42 +97,50 @@ function nodesOf(json: Part): Map<number, Matrix4> {
   return found;
 }
 
-function ownTransform(node: Part, name: string): Matrix4 {
+function product(a: Placement, b: Placement): Placement {
+  return mat4.multiply([...identity] as mat4, a as mat4, b as mat4) as Placement;
+}
+
+function ownTransform(node: Part, name: string): Placement {
   const numbers = (key: string, otherwise: readonly number[]) => {
     const list = node[key] ?? otherwise;
     const isRight = Array.isArray(list) && list.length === otherwise.length && list.every(Number.isFinite);
     return isRight ? (list as number[]) : refuse(name, `has a “${key}” that is no list of ${otherwise.length} numbers`);
   };
-  if (node["matrix"] !== undefined) return new Matrix4().fromArray(numbers("matrix", new Matrix4().elements));
+  if (node["matrix"] !== undefined) return numbers("matrix", identity);
   const [translation, rotation, scale] = [
     numbers("translation", [0, 0, 0]),
     numbers("rotation", [0, 0, 0, 1]),
     numbers("scale", [1, 1, 1]),
   ];
-  const turn = new Quaternion().fromArray(rotation).normalize();
-  return new Matrix4().compose(new Vector3().fromArray(translation), turn, new Vector3().fromArray(scale));
+  const turn = quat.normalize([0, 0, 0, 1], rotation as quat);
+  return mat4.fromRotationTranslationScale(
+    [...identity] as mat4,
+    turn,
+    translation as vec3,
+    scale as vec3,
+  ) as Placement;
 }
 
 /** A mesh with a skin stands where its joints place it if they all agree, as in the pose of binding. */
-function skinPlacement(document: GltfDocument, node: Part, worlds: Map<number, Matrix4>, name: string): Matrix4 {
+function skinPlacement(document: GltfDocument, node: Part, worlds: Map<number, Placement>, name: string): Placement {
   const { json } = document;
   const skin = listOf(json, "skins")[indexOf(json, node["skin"], "skins", name)]!;
   const joints = Array.isArray(skin["joints"]) ? (skin["joints"] as unknown[]) : [];
   const accessor = skin["inverseBindMatrices"];
-  const inverse = accessor === undefined ? undefined : readNumbers(document, indexOf(json, accessor, "accessors", name), 16);
+  const inverse =
+    accessor === undefined ? undefined : readNumbers(document, indexOf(json, accessor, "accessors", name), 16);
   const placed = joints.map((joint, k) => {
-    const bind = inverse && inverse.length >= 16 * (k + 1) ? new Matrix4().fromArray(inverse, 16 * k) : new Matrix4();
-    return new Matrix4().multiplyMatrices(worlds.get(joint as number) ?? new Matrix4(), bind);
+    const bind = inverse && inverse.length >= 16 * (k + 1) ? [...inverse.subarray(16 * k, 16 * (k + 1))] : identity;
+    return product(worlds.get(joint as number) ?? identity, bind);
   });
   const [first] = placed;
-  const size = Math.hypot(...(first?.elements ?? [0]));
-  const areSame = placed.every(({ elements }) =>
-    elements.every((value, k) => Math.abs(value - first!.elements[k]!) <= 1e-3 * size),
-  );
-  return first && areSame ? first : new Matrix4();
+  const size = Math.hypot(...(first ?? [0]));
+  const areSame = placed.every((one) => one.every((value, k) => Math.abs(value - first![k]!) <= 1e-3 * size));
+  return first && areSame ? first : identity;
 }
 
-function readNode(document: GltfDocument, node: number, worlds: Map<number, Matrix4>, list: DrawList): void {
+function readNode(document: GltfDocument, node: number, worlds: Map<number, Placement>, list: DrawList): void {
   const { json } = document;
   const object = listOf(json, "nodes")[node]!;
   const name = nameOf(json, "nodes", node);
@@ -134,8 +148,8 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Matr
     refuse(name, "draws by EXT_mesh_gpu_instancing, which is not read");
   const mesh = indexOf(json, object["mesh"], "meshes", name);
   const placement = object["skin"] === undefined ? worlds.get(node)! : skinPlacement(document, object, worlds, name);
-  const size = Math.hypot(...placement.elements.slice(0, 11));
-  if (!(Math.abs(placement.determinant()) > 1e-12 * size ** 3)) {
+  const size = Math.hypot(...placement.slice(0, 11));
+  if (!(Math.abs(mat4.determinant(placement as mat4)) > 1e-12 * size ** 3)) {
     list.left.add(`what ${name} draws, which its scale flattens`);
     return;
   }
@@ -155,12 +169,16 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Matr
       list.left.add("points and lines");
       return;
     }
-    let block = own.find((other) => other.position === position && other.normal === normal && other.tangent === tangent);
+    let block = own.find(
+      (other) => other.position === position && other.normal === normal && other.tangent === tangent,
+    );
     if (block) block.primitives.push(k);
     else {
       const count = countOf(document, position);
-      if (normal !== undefined && countOf(document, normal) !== count) refuse(part, "has attributes of different lengths");
-      if (tangent !== undefined && countOf(document, tangent) !== count) refuse(part, "has attributes of different lengths");
+      if (normal !== undefined && countOf(document, normal) !== count)
+        refuse(part, "has attributes of different lengths");
+      if (tangent !== undefined && countOf(document, tangent) !== count)
+        refuse(part, "has attributes of different lengths");
       block = { node, mesh, primitives: [k], position, normal, tangent, placement, first: list.vertexCount, count };
       own.push(block);
       list.vertexCount += count;
@@ -181,8 +199,13 @@ function cornersOf(document: GltfDocument, primitive: Part, count: number, part:
   return corners;
 }
 
-function addTriangles(corners: ArrayLike<number>, mode: number, { placement, first }: Block, { faces }: DrawList): void {
-  const isMirrored = placement.determinant() < 0;
+function addTriangles(
+  corners: ArrayLike<number>,
+  mode: number,
+  { placement, first }: Block,
+  { faces }: DrawList,
+): void {
+  const isMirrored = mat4.determinant(placement as mat4) < 0;
   for (let k = 0; k + 2 < corners.length; k += mode === triangles ? 3 : 1) {
     const [a, b, c] = [corners[mode === fan ? 0 : k]!, corners[k + 1]!, corners[k + 2]!];
     if (mode !== triangles && (a === b || b === c || c === a)) continue; // strips are joined by such triangles

@@ -1,11 +1,4 @@
-/** What the side panel shows of the energies of the cells. */
-export interface EnergyStatistics {
-  max: number;
-  /** The energy drawn in full red: the 95th percentile, or the maximum if that percentile is 0. */
-  red: number;
-  /** The sum of the largest ceil(n/20) energies divided by the sum of all; 0 if all are 0. */
-  top5Share: number;
-}
+import type { EnergyStatistics } from "../types.js";
 
 const binCount = 4096;
 const bins = new Uint32Array(binCount);

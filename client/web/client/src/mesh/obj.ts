@@ -1,4 +1,4 @@
-import { polygonsOf, type Mesh, type WrittenMesh } from "../model/mesh.js";
+import type { Mesh } from "./mesh.js";
 import { MeshBuilder } from "./builder.js";
 import { FileFault } from "./fault.js";
 import { cornerOf, logicalLines } from "./obj_lines.js";
@@ -57,13 +57,4 @@ function checkCorners(name: string, text: string, vertexCount: number): void {
     const limit = wrong.startsWith("-") ? `${before} vertices come before it` : `there are ${vertexCount} vertices`;
     throw new FileFault(`${name}, line ${number}: face ${face} has the corner “${wrong}”; ${limit}.`);
   }
-}
-
-export function writeObj({ positions, faces, corners }: WrittenMesh): string {
-  const lines: string[] = [];
-  for (let k = 0; k < positions.length; k += 3) lines.push(`v ${positions[k]} ${positions[k + 1]} ${positions[k + 2]}`);
-  for (const polygon of polygonsOf({ faces, ...(corners && { corners }) })) {
-    lines.push(`f ${polygon.map((vertex) => vertex + 1).join(" ")}`);
-  }
-  return `${lines.join("\n")}\n`;
 }

@@ -1,4 +1,4 @@
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh } from "./mesh.js";
 import { FileFault } from "./fault.js";
 
 /** Squares of distances then stay within the range of float32. */
@@ -59,7 +59,9 @@ export class MeshBuilder {
       const vertex = this.faces[k]!;
       if (Number.isInteger(vertex) && vertex >= 0 && vertex < this.vertexCount) continue;
       const has = Number.isInteger(vertex) ? ` has vertex ${vertex}` : " has a corner that is no whole number";
-      throw new FileFault(`${faceAt(this.#polygonOf(k))}${has}; there are ${this.vertexCount} vertices, counted from 0.`);
+      throw new FileFault(
+        `${faceAt(this.#polygonOf(k))}${has}; there are ${this.vertexCount} vertices, counted from 0.`,
+      );
     }
     const faces = Uint32Array.from(this.faces);
     const positions = Float32Array.from(this.positions);

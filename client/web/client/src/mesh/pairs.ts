@@ -41,7 +41,8 @@ export class Pairs {
   #slot(a: number, b: number): number {
     const mixed = Math.imul(a, 0x9e3779b1) ^ Math.imul(b, 0x85ebca6b);
     let slot = (mixed ^ (mixed >>> 15)) & this.#mask;
-    while (this.#values[slot]! >= 0 && (this.#first[slot] !== a || this.#second[slot] !== b)) slot = (slot + 1) & this.#mask;
+    while (this.#values[slot]! >= 0 && (this.#first[slot] !== a || this.#second[slot] !== b))
+      slot = (slot + 1) & this.#mask;
     return slot;
   }
 }

@@ -44,6 +44,15 @@ export function meanEdge({ starts, neighbours }: Adjacency, positions: Float32Ar
   return neighbours.length > 0 ? sum / neighbours.length : 0;
 }
 
+/** 0 if there are no edges. */
+export function shortestEdge({ starts, neighbours }: Adjacency, positions: Float32Array): number {
+  let least = Infinity;
+  for (let v = 0; v + 1 < starts.length; ++v) {
+    for (let k = starts[v]!; k < starts[v + 1]!; ++k) least = Math.min(least, distance(positions, v, neighbours[k]!));
+  }
+  return neighbours.length > 0 ? least : 0;
+}
+
 export function distance(positions: Float32Array, a: number, b: number): number {
   const dx = positions[3 * a]! - positions[3 * b]!;
   const dy = positions[3 * a + 1]! - positions[3 * b + 1]!;

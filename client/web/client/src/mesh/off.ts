@@ -1,4 +1,4 @@
-import { polygonsOf, type Mesh, type WrittenMesh } from "../model/mesh.js";
+import type { Mesh } from "./mesh.js";
 import { MeshBuilder } from "./builder.js";
 import { FileFault } from "./fault.js";
 
@@ -15,7 +15,8 @@ export function readOff(name: string, text: string): Mesh {
   let next = 1;
   const counts = (header[2] || lines[next++]?.text || "").split(/\s+/).map(Number);
   const [vertexCount = NaN, faceCount = NaN] = counts;
-  if (!(vertexCount >= 0 && faceCount >= 0)) throw new FileFault(`${name} does not say how many vertices and faces it has.`);
+  if (!(vertexCount >= 0 && faceCount >= 0))
+    throw new FileFault(`${name} does not say how many vertices and faces it has.`);
   const builder = new MeshBuilder();
   for (const [letter, what] of Object.entries(beside)) if (header[1]!.includes(letter)) builder.leftAside(what);
   const line = (what: string) => {
@@ -39,12 +40,4 @@ export function readOff(name: string, text: string): Mesh {
     if (corners.length > count) builder.leftAside("colours of faces");
   }
   return builder.finish(name, (face) => `${name}, line ${lines[firstFace + face]!.number}: face ${face}`);
-}
-
-export function writeOff({ positions, faces, corners }: WrittenMesh): string {
-  const lines = ["OFF", `${positions.length / 3} ${corners?.length ?? faces.length / 3} 0`];
-  for (let k = 0; k < positions.length; k += 3) lines.push(`${positions[k]} ${positions[k + 1]} ${positions[k + 2]}`);
-  for (const polygon of polygonsOf({ faces, ...(corners && { corners }) }))
-    lines.push(`${polygon.length} ${polygon.join(" ")}`);
-  return `${lines.join("\n")}\n`;
 }

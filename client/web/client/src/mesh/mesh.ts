@@ -16,6 +16,8 @@ export interface Mesh {
   beside?: readonly string[];
   /** The OBJ file itself, so that its other contents can be saved with it. */
   obj?: Uint8Array;
+  /** Files that were opened with an OBJ, by name: its MTL and images. */
+  materials?: Readonly<Record<string, Blob>>;
   /** The GLB file itself, for the same. */
   gltf?: Uint8Array;
 }

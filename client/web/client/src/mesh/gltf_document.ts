@@ -19,7 +19,11 @@ export function refuse(part: string, what: string): never {
  * Reads a GLB, or the JSON of a glTF. Buffers and images in other files are put in if they are `beside` it, by name; several
  * buffers become one. Throws a FileFault.
  */
-export function readGltfDocument(name: string, bytes: Uint8Array, beside: ReadonlyMap<string, Uint8Array>): GltfDocument {
+export function readGltfDocument(
+  name: string,
+  bytes: Uint8Array,
+  beside: ReadonlyMap<string, Uint8Array>,
+): GltfDocument {
   const isGlb = bytes.length >= 4 && viewOf(bytes).getUint32(0, true) === magic;
   const { text, binary } = isGlb ? chunksOf(name, bytes) : { text: bytes, binary: undefined };
   let json: Part;

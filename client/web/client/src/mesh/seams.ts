@@ -1,9 +1,6 @@
 import { boundsOf, type Mesh } from "./mesh.js";
 import { Pairs } from "./pairs.js";
 
-/** Share of the diagonal. Vertices that are no farther apart are in the same place, as the server's default says. */
-const samePlace = 1e-6;
-
 /**
  * Vertices on open borders that are in the same place. Files of game engines have them where texture coordinates or normals
  * change along a seam. The surface holds together only if such vertices count as one.
@@ -53,8 +50,11 @@ export class Seams {
   }
 }
 
-/** Undefined if no vertices on borders are in the same place. */
-export function seamsOf(mesh: Mesh): Seams | undefined {
+/**
+ * Undefined if no vertices on borders are in the same place. `tolerance`: how far apart they may be, as a share of the diagonal; what
+ * lies between two of them is joined to both.
+ */
+export function seamsOf(mesh: Mesh, tolerance: number): Seams | undefined {
   const positions = mesh.exact ?? mesh.positions;
   const border = borderVertices(mesh.faces);
   if (border.length === 0) return undefined;
@@ -64,7 +64,8 @@ export function seamsOf(mesh: Mesh): Seams | undefined {
     return vertex;
   };
   let isAny = false;
-  forEachInOnePlace(positions, border, samePlace * boundsOf(mesh.positions, mesh.faces).diagonal, (a, b) => {
+  const { diagonal } = boundsOf(mesh.positions, mesh.faces);
+  forEachInOnePlace(positions, border, tolerance * diagonal, cellShare * diagonal, (a, b) => {
     const [low, high] = [first(a), first(b)].sort((one, other) => one - other) as [number, number];
     groups[high] = low;
     isAny = true;
@@ -93,17 +94,18 @@ function borderVertices(faces: Uint32Array): number[] {
 
 type Numbers = Float32Array | Float64Array;
 
-/**
- * Visits every pair that is at most `distance` apart, using cells of space that are much larger than that but seldom hold two
- * places.
- */
+/** The size of cells, as a share of the diagonal: such a cell seldom holds two places. */
+const cellShare = 1e-4;
+
+/** Visits every pair that is at most `distance` apart, using cells of space that are larger than that. */
 function forEachInOnePlace(
   positions: Numbers,
   vertices: readonly number[],
   distance: number,
+  leastSize: number,
   found: (a: number, b: number) => void,
 ): void {
-  const size = 1000 * distance;
+  const size = Math.max(2 * distance, leastSize);
   const cells = new Map<string, number[]>();
   for (const vertex of vertices) {
     let isThere = false; // exactly the same place: one vertex stands for all of them

@@ -1,4 +1,4 @@
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh } from "./mesh.js";
 import { FileFault } from "./fault.js";
 import { readGltf } from "./gltf.js";
 import { readObj } from "./obj.js";
@@ -7,7 +7,7 @@ import { readPly } from "./ply.js";
 import { readStl } from "./stl.js";
 
 /** Reads a mesh file by the ending of its name. `beside`: what was opened with it, by name. Throws a FileFault. */
-export function readMesh(name: string, bytes: Uint8Array, beside?: ReadonlyMap<string, Uint8Array>): Mesh {
+export function parseMesh(name: string, bytes: Uint8Array, beside?: ReadonlyMap<string, Uint8Array>): Mesh {
   switch (name.toLowerCase().split(".").at(-1)) {
     case "glb":
     case "gltf":
@@ -15,14 +15,21 @@ export function readMesh(name: string, bytes: Uint8Array, beside?: ReadonlyMap<s
     case "off":
       return readOff(name, text(bytes));
     case "obj":
-      return { ...readObj(name, text(bytes)), obj: bytes };
+      return { ...readObj(name, text(bytes)), obj: bytes, ...materialsIn(beside) };
     case "ply":
       return readPly(name, bytes);
     case "stl":
       return readStl(name, bytes);
     default:
-      throw new FileFault(`${name} is not a mesh that can be read: GLB, glTF, OFF, OBJ, PLY, STL, FBX, DAE and 3MF can.`);
+      throw new FileFault(
+        `${name} is not a mesh that can be read: GLB, glTF, OFF, OBJ, PLY, STL, FBX, DAE and 3MF can.`,
+      );
   }
+}
+
+function materialsIn(beside: ReadonlyMap<string, Uint8Array> = new Map()): Pick<Mesh, "materials"> {
+  const files = [...beside].map(([name, bytes]) => [name, new Blob([bytes as Uint8Array<ArrayBuffer>])] as const);
+  return files.some(([name]) => /\.mtl$/i.test(name)) ? { materials: Object.fromEntries(files) } : {};
 }
 
 function text(bytes: Uint8Array): string {

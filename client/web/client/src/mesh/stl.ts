@@ -1,4 +1,4 @@
-import type { Mesh } from "../model/mesh.js";
+import type { Mesh } from "./mesh.js";
 import { MeshBuilder } from "./builder.js";
 import { FileFault } from "./fault.js";
 
@@ -20,7 +20,8 @@ function isBinary(bytes: Uint8Array): boolean {
 function readBinary(name: string, bytes: Uint8Array, welder: Welder): void {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const count = view.getUint32(80, true);
-  if (bytes.length < 84 + 50 * count) throw new FileFault(`${name} has ${count} triangles by its header and ends too soon.`);
+  if (bytes.length < 84 + 50 * count)
+    throw new FileFault(`${name} has ${count} triangles by its header and ends too soon.`);
   for (let f = 0; f < count; ++f) {
     if (view.getUint16(84 + 50 * f + 48, true) !== 0) welder.builder.leftAside("attributes of triangles");
     for (let number = 3; number < 12; number += 3) {
@@ -58,6 +59,7 @@ class Welder {
   }
 
   end(): void {
-    if (this.#face.length > 0) throw new FileFault(`${this.name} ends within triangle ${this.builder.faces.length / 3}.`);
+    if (this.#face.length > 0)
+      throw new FileFault(`${this.name} ends within triangle ${this.builder.faces.length / 3}.`);
   }
 }

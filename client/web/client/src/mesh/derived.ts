@@ -1,0 +1,96 @@
+import type { Weld } from "../types.js";
+import { type Adjacency, adjacencyOf, meanEdge, shortestEdge } from "./adjacency.js";
+import type { DrawnAt } from "../types.js";
+import { drawnAt } from "./drawmesh.js";
+import { type Drawn, drawnOf } from "./drawn.js";
+import { faceOrder } from "./face_blocks.js";
+import { type Bounds, boundsOf, type Mesh } from "./mesh.js";
+import { type Seams, seamsOf } from "./seams.js";
+import { guessYUp } from "./up.js";
+
+/** Which vertices count as one. */
+export interface Welding {
+  /** How far apart vertices on open borders may be in one place, as a share of the diagonal: 0 to 0.001, as servers take it. */
+  tolerance: number;
+  /** Whether they count as one; if not, seams are found and nothing else. */
+  isOn: boolean;
+}
+
+/** The server's own tolerance. */
+export const usualWelding: Welding = { tolerance: 1e-6, isOn: true };
+
+/** What is found of the faces of a mesh, welded or not. */
+export interface Shown {
+  adjacency: Adjacency;
+  drawn: Drawn;
+  /** Of the drawn vertices at rest. They do not change. */
+  atRest: DrawnAt;
+}
+
+/** What is found of a mesh before it is shown. It takes about a second for 100,000 vertices. */
+export interface Derived {
+  welding: Welding;
+  seams: Seams | undefined;
+  bounds: Bounds;
+  /** The mean length of the edges, and the least. */
+  edge: number;
+  shortestEdge: number;
+  isYUp: boolean;
+  /** See faceOrder(). */
+  order: Uint32Array;
+  /** Of the welded faces, if there are seams and they are welded. */
+  shown: Shown;
+}
+
+const known = new WeakMap<Mesh, Derived>();
+
+/**
+ * For `weld` of openSession(); undefined if no two vertices are one. Servers take groups of what lies within the usual tolerance only;
+ * what lies farther apart they find themselves, everywhere on the mesh.
+ */
+export function weldOf({ seams, welding: { tolerance, isOn } }: Derived): Weld | undefined {
+  if (!isOn || !seams) return undefined;
+  return tolerance > usualWelding.tolerance ? { tolerance } : seams.groups;
+}
+
+/** What was found last, or is found now with the usual welding. */
+export function derivedOf(mesh: Mesh): Derived {
+  const before = known.get(mesh);
+  if (before) return before;
+  const derived = derive(mesh, usualWelding);
+  know(mesh, derived);
+  return derived;
+}
+
+/** It was found elsewhere. */
+export function know(mesh: Mesh, derived: Derived): void {
+  known.set(mesh, derived);
+}
+
+export function isKnown(mesh: Mesh, { tolerance, isOn }: Welding): boolean {
+  const before = known.get(mesh)?.welding;
+  return before?.tolerance === tolerance && before.isOn === isOn;
+}
+
+export function derive(mesh: Mesh, welding: Welding): Derived {
+  const { positions, faces } = mesh;
+  const seams = seamsOf(mesh, welding.tolerance);
+  const own = adjacencyOf(positions.length / 3, faces);
+  const welded = welding.isOn && seams?.faces;
+  const drawn = drawnOf({ positions, faces: welded || faces });
+  const shown = {
+    adjacency: welded ? adjacencyOf(positions.length / 3, welded) : own,
+    drawn,
+    atRest: drawnAt(positions, drawn),
+  };
+  return {
+    welding,
+    seams,
+    bounds: boundsOf(positions, faces),
+    edge: meanEdge(own, positions),
+    shortestEdge: shortestEdge(own, positions),
+    isYUp: guessYUp(mesh),
+    order: faceOrder(positions, faces),
+    shown,
+  };
+}

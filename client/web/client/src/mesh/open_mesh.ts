@@ -1,0 +1,195 @@
+import { LpdeformError } from "../errors.js";
+import type { Packed, Shaded, Unpacked, Weld } from "../types.js";
+import { type Derived, know, usualWelding, type Welding, weldOf } from "./derived.js";
+import { Desk, type Opening, type PullRequest, type Questions, type Source } from "./desk.js";
+import { FileFault } from "./fault.js";
+import type { Mesh } from "./mesh.js";
+import { Seams } from "./seams.js";
+import type { Surface } from "./shaded.js";
+import type { StoredMesh } from "./stored.js";
+
+export interface ReadOptions {
+  /** Files that a `.gltf` names, or the MTL and images of an OBJ (Mesh.materials). */
+  beside?: readonly File[];
+  /** Default: vertices on open borders are one within 1e-6 of the diagonal. */
+  welding?: Welding;
+}
+
+/** What a worker is asked, and how it answers: with the answer, or why there is none. */
+export type Question = {
+  [Name in keyof Questions]: { id: number; name: Name; asked: Questions[Name][0] };
+}[keyof Questions];
+export type Answer = { id: number } & ({ answer: unknown } | { fault: string } | { error: string });
+
+/** Below this size a page is as quick by itself. */
+const smallBytes = 200_000;
+
+/** A reply is waited for. */
+interface Waiting {
+  done: (answer: unknown) => void;
+  failed: (error: unknown) => void;
+}
+
+/**
+ * A mesh, what is needed to show it, and the worker that has found that and goes on with the frames of a session (`shading` of
+ * openSession()). If the mesh is small, or the page can have no worker, the page does all that by itself.
+ */
+export class OpenMesh {
+  readonly mesh: Mesh;
+  #derived: Derived;
+
+  private constructor(
+    readonly line: Line,
+    source: Source,
+    { mesh, derived }: Opening,
+  ) {
+    this.mesh = mesh ?? (source as { mesh: Mesh }).mesh;
+    this.#derived = this.#know(derived);
+  }
+
+  /** Rejects with a FileFault that names the place in the file. */
+  static async from(source: Source, welding: Welding = usualWelding): Promise<OpenMesh> {
+    const line = Line.to(isLarge(source));
+    try {
+      return new OpenMesh(line, source, await line.ask("open", { ...source, welding }));
+    } catch (thrown) {
+      line.close();
+      if (!(thrown instanceof WorkerGone) || !line.isWorker) throw thrown;
+    }
+    const here = Line.to(false);
+    return new OpenMesh(here, source, await here.ask("open", { ...source, welding }));
+  }
+
+  /** Whether a worker answers. */
+  get isInWorker(): boolean {
+    return this.line.isWorker;
+  }
+
+  get derived(): Derived {
+    return this.#derived;
+  }
+
+  /** For openSession(). */
+  get sessionMesh(): { vertices: Float32Array | Float64Array; faces: Uint32Array } {
+    const { positions, exact, faces } = this.mesh;
+    return { vertices: exact ?? positions, faces };
+  }
+
+  /** For `weld` of openSession(). Undefined if no two vertices are one. */
+  get weld(): Weld | undefined {
+    return weldOf(this.#derived);
+  }
+
+  /** Finds again what is one. What is drawn changes with it. */
+  async reweld(welding: Welding): Promise<Derived> {
+    return (this.#derived = this.#know(await this.line.ask("weld", welding)));
+  }
+
+  /** For sessions. Rejects with a LpdeformError (FRAME_PARTS) if a block cannot be read. */
+  unpack(packed: Packed): Promise<Unpacked & { shaded: Shaded }> {
+    const bytes = packed.parts.flatMap(({ vertices, normals }) => [vertices.buffer, normals.buffer] as ArrayBuffer[]);
+    return this.line.ask("unpack", packed, bytes);
+  }
+
+  /** What is drawn of a surface of this mesh. */
+  shade({ positions, distortion }: Surface): Promise<Shaded> {
+    return this.line.ask("shade", { positions, distortion });
+  }
+
+  /** See pullOf(). */
+  pull({ pulled, held }: PullRequest): Promise<Float32Array> {
+    return this.line.ask("pull", { pulled, held });
+  }
+
+  /** For the browser's database, and for OpenMesh.from(). */
+  store(): Promise<StoredMesh> {
+    return this.line.ask("store", undefined);
+  }
+
+  /** Ends the worker. What was asked and not answered is rejected. */
+  close(): void {
+    this.line.close();
+  }
+
+  #know(derived: Derived): Derived {
+    const { seams } = derived;
+    const whole = { ...derived, seams: seams && new Seams(seams.groups, seams.faces) }; // a worker's answer has no classes
+    know(this.mesh, whole);
+    return whole;
+  }
+}
+
+/** Reads OBJ, OFF, PLY, STL, GLB or glTF by the ending of the file's name. Rejects with a FileFault. */
+export function readMesh(file: File, { beside = [], welding }: ReadOptions = {}): Promise<OpenMesh> {
+  return OpenMesh.from({ file, beside }, welding);
+}
+
+function isLarge(source: Source): boolean {
+  if ("mesh" in source) return source.mesh.positions.byteLength + source.mesh.faces.byteLength > smallBytes;
+  if ("stored" in source) return source.stored.blob.size > smallBytes;
+  return [source.file, ...source.beside].some(({ size }) => size > smallBytes);
+}
+
+/** The worker cannot be loaded, or has ended. */
+class WorkerGone extends LpdeformError {
+  constructor() {
+    super("unavailable", "The mesh is closed, or its worker has ended.");
+  }
+}
+
+/** Asks a desk: one in a worker, or one in the page. */
+class Line {
+  readonly #waiting = new Map<number, Waiting>();
+  #desk: Desk | undefined;
+  #lastId = 0;
+  #isClosed = false;
+
+  private constructor(readonly worker: Worker | undefined) {
+    if (!worker) this.#desk = new Desk();
+    else {
+      worker.onmessage = ({ data }: MessageEvent<Answer>) => this.#take(data);
+      worker.onerror = () => this.close();
+    }
+  }
+
+  static to(isWorkerWanted: boolean): Line {
+    let worker: Worker | undefined;
+    try {
+      if (isWorkerWanted) worker = new Worker(new URL("./mesh_worker.js", import.meta.url), { type: "module" });
+    } catch {
+      worker = undefined;
+    }
+    return new Line(worker);
+  }
+
+  get isWorker(): boolean {
+    return this.worker !== undefined;
+  }
+
+  ask<Name extends keyof Questions>(
+    name: Name,
+    asked: Questions[Name][0],
+    transfer: Transferable[] = [],
+  ): Promise<Questions[Name][1]> {
+    if (this.#isClosed) return Promise.reject(new WorkerGone());
+    if (this.#desk) return this.#desk.answer(name, asked);
+    const id = ++this.#lastId;
+    this.worker!.postMessage({ id, name, asked } as Question, transfer);
+    return new Promise((done, failed) => this.#waiting.set(id, { done: done as Waiting["done"], failed }));
+  }
+
+  close(): void {
+    this.#isClosed = true;
+    this.worker?.terminate();
+    for (const { failed } of this.#waiting.values()) failed(new WorkerGone());
+    this.#waiting.clear();
+  }
+
+  #take(data: Answer): void {
+    const waiting = this.#waiting.get(data.id);
+    this.#waiting.delete(data.id);
+    if ("fault" in data) waiting?.failed(new FileFault(data.fault));
+    else if ("error" in data) waiting?.failed(new Error(data.error));
+    else waiting?.done(data.answer);
+  }
+}
