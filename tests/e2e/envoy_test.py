@@ -225,6 +225,7 @@ class Connections(ThroughEnvoy):
 
     def test_whoever_trickles_headers_at_the_port_for_probes_keeps_nobody_else_from_it(self):
         envoy = self.start("--server", self.serve().address, "--health", "127.0.0.1:0")
+        self.until_served(envoy)  # it listens a little later than it tells its ports
         place = urllib.parse.urlsplit(envoy.health)
         tricklers = [socket.create_connection((place.hostname, place.port), programs.PATIENCE) for _ in range(200)]
         for one in tricklers:
