@@ -1,6 +1,6 @@
 # The server and the command line in one image, Envoy and the viewer in another (--target web). The steps are those of the
 # README, by the same scripts. For another kind of machine (--platform linux/arm64, or linux/amd64 on arm64) they are compiled on this
-# one, and only the packages of the images are installed in emulation. Needs BuildKit, which Docker has had since 23, or Buildah.
+# one, and only the packages of the images are installed in emulation. Needs BuildKit or Buildah (deploy/one.md).
 
 FROM --platform=$BUILDPLATFORM debian:13 AS build
 ARG TARGETARCH

@@ -8,12 +8,13 @@
 
 namespace lpdeform::gltf {
 
-/// Elements of this many other layouts may lie between those of one; 250 bytes of a stride hold about as many.
+/// Elements of this many other layouts may lie between those of one. A stride of 252 bytes, the most that glTF allows, holds 63
+/// elements of 4 bytes.
 constexpr std::size_t kMostBetween = 64;
 
 /// For each layout, all of one buffer, whether it shares no byte with another one. `share_bytes` says so of two; it is asked at
 /// most kMostBetween times for each layout. A layout in whose reach more others begin counts as one that shares bytes, and so do
-/// the others.
+/// all layouts that begin there.
 std::vector<bool> alone(const std::vector<Layout>& layouts,
                         const std::function<bool(const Layout&, const Layout&)>& share_bytes);
 

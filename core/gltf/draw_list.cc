@@ -52,7 +52,7 @@ class Reader {
     if (extensions != nullptr && value_of(*extensions, "EXT_mesh_gpu_instancing") != nullptr)
       refuse_unsupported(part, "draws its mesh many times by EXT_mesh_gpu_instancing, which is not read");
     const std::size_t mesh = needed_index(root_, object, "mesh", "meshes", part);
-    const Eigen::Affine3d placed = placement(document_, tree_, node);
+    const Eigen::Affine3d placed = placement(document_, tree_, node, of_skins_);
     const double size = placed.linear().norm();
     if (!(std::abs(placed.linear().determinant()) > 1e-12 * size * size * size) || !std::isfinite(size)) {
       list_.notices.push_back(
@@ -160,6 +160,7 @@ class Reader {
   const Document& document_;
   const Json& root_;
   const NodeTree tree_;
+  std::map<std::size_t, Eigen::Affine3d> of_skins_;
   DrawList list_;
   Eigen::Index vertex_count_ = 0;
   std::size_t corners_read_ = 0, primitives_read_ = 0;

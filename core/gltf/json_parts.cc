@@ -14,6 +14,7 @@ namespace {
 
 constexpr int kDeepest = 100;  // nlohmann-json writes by recursion
 constexpr std::size_t kLongest = 60;
+constexpr std::size_t kMostKeys = 100;  // glTF has 19 for its root; each look for a key goes through all
 
 std::string sentence(const std::string& part, std::string_view what) {
   std::string text = absl::StrCat(part, " ", std::string(what), ".");
@@ -56,6 +57,7 @@ Json parse_json(std::string_view text) {
   try {
     Json root = Json::parse(text);
     if (!root.is_object()) refuse("the JSON", "is no object");
+    if (root.size() > kMostKeys) refuse("the JSON", absl::StrCat("has more than ", kMostKeys, " keys"));
     return root;
   } catch (const Json::parse_error& error) {
     refuse("the JSON", absl::StrCat("breaks off or is wrong at byte ", error.byte));
@@ -93,6 +95,8 @@ const Json& item(const Json& root, const char* list, std::size_t index) {
   LPDEFORM_CHECK(index < count_of(root, list));
   const Json& found = root[list][index];
   if (!found.is_object()) refuse(part_name(root, list, index), "is no object");
+  if (found.size() > kMostKeys)
+    refuse(part_name(root, list, index), absl::StrCat("has more than ", kMostKeys, " keys"));
   return found;
 }
 

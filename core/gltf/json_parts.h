@@ -26,7 +26,7 @@ struct Refusal {
 /// Throws MESH_UNSUPPORTED, likewise.
 [[noreturn]] void refuse_unsupported(const std::string& part, std::string_view what);
 
-/// Throws MESH_SYNTAX if `text` is no JSON object, or nests deeper than 100 levels.
+/// Throws MESH_SYNTAX if `text` is no JSON object, has more than 100 keys, or nests deeper than 100 levels.
 Json parse_json(std::string_view text);
 
 /// Text of a file for a message: no quotes or control characters, and cut where it is long, between characters of UTF-8.
@@ -38,7 +38,7 @@ std::string part_name(const Json& root, const char* list, std::size_t index);
 /// The number of items of a list of the root, 0 if there is no such list.
 std::size_t count_of(const Json& root, const char* list);
 
-/// The item, which must be an object. Requires index < count_of().
+/// The item, which must be an object of at most 100 keys. Requires index < count_of().
 const Json& item(const Json& root, const char* list, std::size_t index);
 
 /// The value of a key, or nullptr. `object` must be an object, or it has no keys.

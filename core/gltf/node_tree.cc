@@ -78,6 +78,33 @@ std::vector<std::size_t> scene_roots(const Json& root, const Children& children)
   return index_list(root, item(root, "scenes", scene), "nodes", "nodes", part_name(root, "scenes", scene));
 }
 
+/// Where the joints of a skin place a mesh, if they all agree, otherwise the identity.
+Eigen::Affine3d placement_of_skin(const Document& document, const NodeTree& tree, std::size_t number) {
+  const Json& root = document.root;
+  const Json& skin = item(root, "skins", number);
+  const std::string part = part_name(root, "skins", number);
+  const std::vector<std::size_t> joints = index_list(root, skin, "joints", "nodes", part);
+  Table inverse;
+  if (value_of(skin, "inverseBindMatrices") != nullptr) {
+    inverse = read_table(document, needed_index(root, skin, "inverseBindMatrices", "accessors", part), 16);
+    if (inverse.rows() < static_cast<Eigen::Index>(joints.size()))
+      refuse(part, "has fewer \"inverseBindMatrices\" than joints");
+  }
+  Eigen::Matrix4d placed = Eigen::Matrix4d::Identity();
+  for (std::size_t k = 0; k < joints.size(); ++k) {
+    Eigen::Matrix4d one = tree.to_world[joints[k]].matrix();
+    if (inverse.rows() > 0) {
+      const Eigen::RowVectorXd columns = inverse.row(static_cast<Eigen::Index>(k));
+      one *= Eigen::Map<const Eigen::Matrix4d>(columns.data());
+    }
+    if (k == 0) placed = one;
+    if (!one.allFinite() || !one.isApprox(placed, 1e-3)) return Eigen::Affine3d::Identity();
+  }
+  if (!placed.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1), 1e-6)) return Eigen::Affine3d::Identity();
+  placed.row(3) << 0, 0, 0, 1;
+  return Eigen::Affine3d(placed);
+}
+
 }  // namespace
 
 NodeTree read_nodes(const Document& document) {
@@ -101,33 +128,15 @@ NodeTree read_nodes(const Document& document) {
   return tree;
 }
 
-Eigen::Affine3d placement(const Document& document, const NodeTree& tree, std::size_t node) {
+Eigen::Affine3d placement(const Document& document, const NodeTree& tree, std::size_t node,
+                          std::map<std::size_t, Eigen::Affine3d>& of_skins) {
   const Json& root = document.root;
   const Json& object = item(root, "nodes", node);
   if (value_of(object, "skin") == nullptr) return tree.to_world[node];
   const std::size_t number = needed_index(root, object, "skin", "skins", part_name(root, "nodes", node));
-  const Json& skin = item(root, "skins", number);
-  const std::string part = part_name(root, "skins", number);
-  const std::vector<std::size_t> joints = index_list(root, skin, "joints", "nodes", part);
-  Table inverse;
-  if (value_of(skin, "inverseBindMatrices") != nullptr) {
-    inverse = read_table(document, needed_index(root, skin, "inverseBindMatrices", "accessors", part), 16);
-    if (inverse.rows() < static_cast<Eigen::Index>(joints.size()))
-      refuse(part, "has fewer \"inverseBindMatrices\" than joints");
-  }
-  Eigen::Matrix4d placed = Eigen::Matrix4d::Identity();
-  for (std::size_t k = 0; k < joints.size(); ++k) {
-    Eigen::Matrix4d one = tree.to_world[joints[k]].matrix();
-    if (inverse.rows() > 0) {
-      const Eigen::RowVectorXd columns = inverse.row(static_cast<Eigen::Index>(k));
-      one *= Eigen::Map<const Eigen::Matrix4d>(columns.data());
-    }
-    if (k == 0) placed = one;
-    if (!one.allFinite() || !one.isApprox(placed, 1e-3)) return Eigen::Affine3d::Identity();
-  }
-  if (!placed.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1), 1e-6)) return Eigen::Affine3d::Identity();
-  placed.row(3) << 0, 0, 0, 1;
-  return Eigen::Affine3d(placed);
+  const auto known = of_skins.find(number);
+  if (known != of_skins.end()) return known->second;
+  return of_skins.emplace(number, placement_of_skin(document, tree, number)).first->second;
 }
 
 }  // namespace lpdeform::gltf

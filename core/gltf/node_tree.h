@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <map>
 #include <vector>
 
 #include "core/gltf/document.h"
@@ -20,6 +21,8 @@ NodeTree read_nodes(const Document& document);
 
 /// What takes the vertices of the node's mesh to where they are drawn. A mesh with a skin stands where its joints place it if
 /// they all agree, as they do in the pose of binding, and otherwise as its file has it; its node's transform counts for nothing.
-Eigen::Affine3d placement(const Document& document, const NodeTree& tree, std::size_t node);
+/// `of_skins` keeps the placement of each skin for the next node that has it.
+Eigen::Affine3d placement(const Document& document, const NodeTree& tree, std::size_t node,
+                          std::map<std::size_t, Eigen::Affine3d>& of_skins);
 
 }  // namespace lpdeform::gltf

@@ -34,12 +34,13 @@ class CoarseLevel {
   absl::Status take_over(const RestShape& fine, const HandleSet& handles, const Constraints& constraints,
                          const Material& material, double bending);
 
-  /// Whether bend_like_fine() pays off: the fine level is large, or is such a level itself, and its weights are not uniform.
+  /// Whether bend_like_fine() pays off: the fine level is large, or its own cells already bend like a finer level's, and its
+  /// weights are not uniform.
   bool can_bend_like_fine() const;
   /// Lets the coarse solver's cells resist bending as the fine level does: multiplies their share by coarse vertices / fine
   /// vertices, until the next take_over(). Only if can_bend_like_fine().
   void bend_like_fine();
-  /// Whether the coarse solver, with cells that bend like the fine level's, begins on a level below its own.
+  /// Whether the coarse level is large enough to begin, with cells that bend like the fine level's, on a level below it.
   bool has_level_below() const { return shape_->vertex_count() >= kLeastEasedLevel; }
 
   static constexpr std::int32_t kLeastEasedLevel = 1000;  // vertices from which on has_level_below()

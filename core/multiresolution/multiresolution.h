@@ -13,9 +13,9 @@ namespace lpdeform {
 /// Solves the coarse level first, by any method that suits it (which may include a level below it), then runs
 /// QuasiNewton from the prolonged result. On large meshes the coarse level is solved as it is, which finds the better
 /// minima, and goes on with cells that bend like those of the fine level (CoarseLevel::bend_like_fine), which saves fine
-/// iterations. If the handles have moved little, which leaves one minimum to find, only the lowest level is solved as it
-/// is, and all others have such cells from the beginning: the way along the valley of bent shapes is then travelled where an
-/// iteration costs least. One iteration of the coarse level counts as one iteration here. Until the coarse level has ended, the state
+/// iterations. If the handles have moved little, which as a rule
+/// leaves one minimum to find, all levels have such cells from the beginning; only the lowest is first solved with the bending
+/// of the level above it. The long way along a curved valley is then travelled where an iteration costs least. One iteration of the coarse level counts as one iteration here. Until the coarse level has ended, the state
 /// is the initial guess. If the prolonged result is not better than the initial guess, QuasiNewton starts from the guess.
 /// The convergence criterion is that of QuasiNewton.
 class Multiresolution : public Minimiser {
@@ -47,7 +47,7 @@ class Multiresolution : public Minimiser {
   CoarseLevel& level_;
   const bool is_search_;
   bool is_eased_ = false;  // the coarse level has cells that bend like the fine ones
-  bool goes_on_ = false;   // and goes on with them from its result without
+  bool goes_on_ = false;   // it was solved without them first
   int looked_at_ = 0;      // iterations of the coarse level at the last prolongation
   std::chrono::steady_clock::time_point next_look_;
   std::unique_ptr<QuasiNewton> fine_;  // null while the coarse level runs

@@ -70,7 +70,7 @@ TEST(Alone, AreFoundWithAFewComparisonsOfEach) {
   }
 }
 
-/// With kMostBetween or more others in its reach, a layout is taken for one that shares bytes, though it does not.
+/// With more than kMostBetween others in its reach, a layout is taken for one that shares bytes, though it does not.
 TEST(Alone, NoneIsWhereTooManyLieBetween) {
   std::vector<Layout> layouts{{0, 0, 16, 12, 1000}};
   for (std::uint64_t k = 0; k <= kMostBetween; ++k) layouts.push_back({0, 16 * k + 12, 16, 4, 1});
@@ -79,7 +79,7 @@ TEST(Alone, NoneIsWhereTooManyLieBetween) {
   EXPECT_THAT(alone(layouts, share_bytes), Each(true));
 }
 
-/// 50,000 triangles with accessors of their own, in one view: comparing all pairs of primitives or of accessors would take hours.
+/// 50,000 triangles with accessors of their own, in one view: comparing all pairs of primitives or of accessors would take most of an hour.
 TEST(Alone, AFileOfVeryManyPrimitivesIsReadAndWrittenInPlace) {
   constexpr int kCount = 50'000;
   MadeGltf made;

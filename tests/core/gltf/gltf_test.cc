@@ -223,6 +223,19 @@ TEST(Gltf, ASkinnedMeshStandsWhereItsJointsPlaceIt) {
   EXPECT_EQ(parsed(made.glb()).mesh().vertices.row(1), Eigen::RowVector3d(1, 0, 2));
 }
 
+TEST(Gltf, NodesThatShareASkinStandWhereItPlacesThem) {
+  MadeGltf made = rich_gltf();
+  made.node({{"translation", {0, 0, 2}}});
+  made.node({{"mesh", 0}, {"skin", 0}, {"translation", {7, 0, 0}}});
+  made.root["nodes"][0]["skin"] = 0;
+  made.root["skins"] = {{{"joints", {1}}}};
+  made.root["scenes"][0]["nodes"] = {0, 1, 2};
+  const Points vertices = parsed(made.glb()).mesh().vertices;
+  ASSERT_EQ(vertices.rows() % 2, 0);
+  EXPECT_EQ(vertices.topRows(vertices.rows() / 2), vertices.bottomRows(vertices.rows() / 2));
+  EXPECT_EQ(vertices(1, 2), 2);
+}
+
 TEST(Gltf, NamesOfNodesMeshesAndMaterialsAreGroups) {
   std::vector<std::string> names;
   for (const NamedVertices& group : parsed(rich_gltf().glb()).groups()) {
@@ -262,6 +275,14 @@ TEST(Gltf, RefusalsNameThePart) {
        unsupported, "node 0 (\"page\")"},
       {[](MadeGltf& m) { m.root["asset"]["version"] = "1.0"; }, unsupported, "the file"},
       {[](MadeGltf& m) { m.root.erase("asset"); }, syntax, "the JSON"},
+      {[](MadeGltf& m) {
+         for (int k = 0; k < 100; ++k) m.root[std::to_string(k)] = k;
+       },
+       syntax, "the JSON"},
+      {[](MadeGltf& m) {
+         for (int k = 0; k < 100; ++k) m.root["accessors"][0][std::to_string(k)] = k;
+       },
+       syntax, "accessor 0"},
       {[](MadeGltf& m) { m.root["accessors"][0]["count"] = 7; }, syntax, "accessor 0"},
       {[](MadeGltf& m) { m.root["accessors"][0]["count"] = -1; }, syntax, "accessor 0"},
       {[](MadeGltf& m) { m.root["accessors"][0]["count"] = 1e9; }, unsupported, "accessor 0"},
