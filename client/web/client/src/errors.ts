@@ -83,6 +83,13 @@ export function sessionClosed(): LpdeformError {
   return new LpdeformError("failed_precondition", "The session is closed.", { reason: "SESSION_CLOSED" });
 }
 
+/** For what nobody should have thrown. */
+export function unforeseen(thrown: unknown): LpdeformError {
+  if (thrown instanceof LpdeformError) return thrown;
+  const message = thrown instanceof Error ? thrown.message : String(thrown);
+  return new LpdeformError("internal", message, { reason: "EXCEPTION" }, thrown);
+}
+
 export const cannotBeReached = "The server cannot be reached.";
 
 /** Converts anything that a call has thrown. */

@@ -1,7 +1,7 @@
 import { FrameAssembly } from "./assembly.js";
 import { FrameBox } from "./box.js";
 import type { WireFrame } from "./frame.js";
-import { fromFault, LpdeformError, sessionClosed } from "./errors.js";
+import { fromFault, LpdeformError, sessionClosed, unforeseen } from "./errors.js";
 import { noticeFromWire } from "./fromwire.js";
 import { Scalar } from "./gen/lpdeform/v1/data_pb.js";
 import { Holds } from "./holds.js";
@@ -214,7 +214,7 @@ export class Link {
           () => {
             if (this.#lane === lane && this.#lease.session === session) this.#takeFrame(frame, lane, streamId);
           },
-          (error) => lane.misfit(error as LpdeformError),
+          (error) => lane.misfit(unforeseen(error)),
         );
       },
       fault: (fault) => {

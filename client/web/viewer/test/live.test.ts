@@ -186,6 +186,12 @@ describe("words at the end", () => {
     expect(status.text).toMatch(/reload the page\. Your work is kept here/);
     expect(isPassing(statusAtEnd(new LpdeformError("data_loss", "cut off", {})))).toBe(true);
   });
+
+  it("of a session by a failure of the page itself say so, and begin again", () => {
+    const status = statusAtEnd(new LpdeformError("internal", "out of memory", { reason: "EXCEPTION" }));
+    expect(isPassing(status)).toBe(true);
+    expect(status.title).toBe("This page failed with a frame");
+  });
 });
 
 describe("the meter", () => {

@@ -71,6 +71,46 @@ it("also where that lies on both sides of 0, or of any other number", () => {
   }
 });
 
+/** Single triangles, one corner of each on the x axis at these places, which are shares of the diagonal. */
+function corners(shares: readonly number[], size = 1): Mesh {
+  const exact = new Float64Array(9 * shares.length);
+  const diagonal = Math.sqrt(3) * size;
+  shares.forEach((share, k) => {
+    const far = (k + 1) / shares.length;
+    exact.set([share * diagonal, 0, 0, size * far, size * far, size * far, 0, size * far, size * far], 9 * k);
+  });
+  const faces = Uint32Array.from({ length: 3 * shares.length }, (_, corner) => corner);
+  return { name: "corners", positions: Float32Array.from(exact), exact, faces };
+}
+
+it("at the usual tolerance every copy is within it of the first of its place, as servers want it of groups", () => {
+  const chain = seamsOf(corners([0, 0.74e-6, 1.48e-6, 0.74e-6]), usual)!;
+  expect([0, 3, 6, 9].map((vertex) => chain.groups[vertex])).toEqual([0, 0, 6, 0]);
+  expect(chain.copyCount).toBe(2);
+});
+
+it("above the usual tolerance chains are joined, as servers weld by position", () => {
+  const chain = seamsOf(corners([0, 0.74e-4, 1.48e-4]), 1e-4)!;
+  expect([0, 3, 6].map((vertex) => chain.groups[vertex])).toEqual([0, 0, 0]);
+});
+
+it("above the usual tolerance vertices count that are on no border, and the diagonal of all vertices", () => {
+  const { mesh } = shapeKinds.find(({ id }) => id === "block")!.make("coarse");
+  const count = mesh.positions.length / 3;
+  expect(seamsOf(together(mesh, mesh), 2e-6)!.copyCount).toBe(count); // closed bodies in one place
+  const tube = splitTube(columns, rows);
+  const far = { ...tube, positions: Float32Array.from([...tube.positions, 1e4, 1e4, 1e4]) }; // no face uses it
+  expect(seamsOf(far, usual)!.copyCount).toBe(rows + 1);
+  expect(seamsOf(far, 1e-3)!.copyCount).toBeGreaterThan(rows + 1);
+});
+
+it("too many vertices within a large tolerance of each other are refused, as servers do", () => {
+  const positions = Float32Array.from({ length: 30_000 }, (_, k) => ((k * 7919) % 30_000) * 1e-9);
+  positions[0] = 1;
+  const heap = { name: "heap", positions, faces: Uint32Array.of(0, 1, 2) };
+  expect(() => seamsOf(heap, 1e-3)).toThrow(expect.objectContaining({ reason: "WELD_TOO_DENSE", element: "weld tolerance" }));
+});
+
 it("surfaces that are closed, or whose borders lie apart, have none", () => {
   const { mesh } = shapeKinds.find(({ id }) => id === "block")!.make("coarse");
   expect(seamsOf(mesh, usual)).toBeUndefined();

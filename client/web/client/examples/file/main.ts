@@ -3,21 +3,39 @@
 //   npx vite examples/file        and the page http://localhost:5173/?url=http://localhost:8080
 import * as THREE from "three";
 import { openSession, type Session } from "lpdeform-client";
-import { readMesh } from "lpdeform-client/mesh";
+import { type OpenMesh, readMesh } from "lpdeform-client/mesh";
 
 const url = new URLSearchParams(location.search).get("url") ?? "http://localhost:8080";
 const [file, shift] = document.querySelectorAll("input") as unknown as [HTMLInputElement, HTMLInputElement];
 const text = document.querySelector("output")!;
 const geometry = new THREE.BufferGeometry();
 let session: Session | undefined;
+let opened: OpenMesh | undefined;
 
-file.onchange = () =>
-  void open(file.files![0]!).catch((error: Error) => {
-    text.value = error.message; // which line or element is wrong
-  });
+file.onchange = async () => {
+  const chosen = file.files![0];
+  if (!chosen) return;
+  file.disabled = true; // one file at a time
+  try {
+    await close();
+    await open(chosen);
+  } catch (error) {
+    text.value = (error as Error).message; // which line or element is wrong
+    await close();
+  }
+  file.disabled = false;
+};
+
+/** Ends the session, and then the worker that reads its frames. */
+async function close(): Promise<void> {
+  await session?.close().catch(() => undefined); // it expires by itself if the server is away
+  opened?.close();
+  session = opened = undefined;
+  surface.visible = false;
+}
 
 async function open(chosen: File): Promise<void> {
-  const opened = await readMesh(chosen);
+  opened = await readMesh(chosen);
   const { positions } = opened.mesh;
   const { bounds, shown } = opened.derived;
   session = await openSession(opened.sessionMesh, { url, weld: opened.weld, shading: opened });
@@ -29,7 +47,7 @@ async function open(chosen: File): Promise<void> {
     base: { vertices: where((y) => y < low + tenth) },
     tip: { vertices: where((y) => y > high - tenth) },
   });
-  shift.oninput = () => session!.move("tip", { translation: [shift.valueAsNumber * bounds.diagonal, 0, 0] });
+  shift.oninput = () => session?.move("tip", { translation: [shift.valueAsNumber * bounds.diagonal, 0, 0] });
 
   const attribute = (array: Float32Array) => new THREE.BufferAttribute(array, 3).setUsage(THREE.DynamicDrawUsage);
   geometry.setIndex(new THREE.BufferAttribute(shown.drawn.indices, 1));

@@ -53,7 +53,7 @@ export function shortestEdge({ starts, neighbours }: Adjacency, positions: Float
   return neighbours.length > 0 ? least : 0;
 }
 
-export function distance(positions: Float32Array, a: number, b: number): number {
+export function distance(positions: Float32Array | Float64Array, a: number, b: number): number {
   const dx = positions[3 * a]! - positions[3 * b]!;
   const dy = positions[3 * a + 1]! - positions[3 * b + 1]!;
   const dz = positions[3 * a + 2]! - positions[3 * b + 2]!;

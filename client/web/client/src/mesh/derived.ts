@@ -1,23 +1,43 @@
-import type { Weld } from "../types.js";
+import { LpdeformError } from "../errors.js";
+import { checkKeys, mistyped } from "../key_checks.js";
+import type { DrawnAt, Weld } from "../types.js";
 import { type Adjacency, adjacencyOf, meanEdge, shortestEdge } from "./adjacency.js";
-import type { DrawnAt } from "../types.js";
 import { drawnAt } from "./drawmesh.js";
 import { type Drawn, drawnOf } from "./drawn.js";
 import { faceOrder } from "./face_blocks.js";
 import { type Bounds, boundsOf, type Mesh } from "./mesh.js";
-import { type Seams, seamsOf } from "./seams.js";
+import { type Seams, seamsOf, usualTolerance } from "./seams.js";
 import { guessYUp } from "./up.js";
 
 /** Which vertices count as one. */
 export interface Welding {
-  /** How far apart vertices on open borders may be in one place, as a share of the diagonal: 0 to 0.001, as servers take it. */
+  /**
+   * How far apart vertices in one place may be, as a share of the diagonal: 0 to 0.001, as servers take it. Up to 1e-6 this is
+   * about vertices on open borders, above that about all vertices.
+   */
   tolerance: number;
   /** Whether they count as one; if not, seams are found and nothing else. */
   isOn: boolean;
 }
 
 /** The server's own tolerance. */
-export const usualWelding: Welding = { tolerance: 1e-6, isOn: true };
+export const usualWelding: Welding = { tolerance: usualTolerance, isOn: true };
+
+const mostTolerance = 1e-3;
+
+/** Throws an LpdeformError: WELD_TOLERANCE, UNKNOWN_KEY, or ARRAY_TYPE for an `isOn` that is no boolean. */
+export function checkWelding(welding: Welding): void {
+  checkKeys(welding, { tolerance: true, isOn: true } satisfies Record<keyof Welding, true>, "welding");
+  const { tolerance, isOn } = welding;
+  if (typeof isOn !== "boolean")
+    throw mistyped(`isOn of welding is ${String(isOn)}`, "isOn of welding", "true or false");
+  if (typeof tolerance === "number" && tolerance >= 0 && tolerance <= mostTolerance) return;
+  throw new LpdeformError(
+    "invalid_argument",
+    `The weld's tolerance is ${String(tolerance)} of the diagonal; it must be 0 to ${mostTolerance}.`,
+    { reason: "WELD_TOLERANCE", element: "weld tolerance", limit: `0 <= tolerance <= ${mostTolerance}` },
+  );
+}
 
 /** What is found of the faces of a mesh, welded or not. */
 export interface Shown {
@@ -46,11 +66,11 @@ const known = new WeakMap<Mesh, Derived>();
 
 /**
  * For `weld` of openSession(); undefined if no two vertices are one. Servers take groups of what lies within the usual tolerance only;
- * what lies farther apart they find themselves, everywhere on the mesh.
+ * what lies farther apart they find themselves, as seamsOf() does.
  */
 export function weldOf({ seams, welding: { tolerance, isOn } }: Derived): Weld | undefined {
   if (!isOn || !seams) return undefined;
-  return tolerance > usualWelding.tolerance ? { tolerance } : seams.groups;
+  return tolerance > usualTolerance ? { tolerance } : seams.groups;
 }
 
 /** What was found last, or is found now with the usual welding. */

@@ -36,6 +36,11 @@ export interface Opening {
 export class Desk {
   #mesh: Mesh | undefined;
 
+  /** `mesh`: one that is open already. */
+  constructor(mesh?: Mesh) {
+    this.#mesh = mesh;
+  }
+
   readonly #answers: { [Name in keyof Questions]: (asked: Questions[Name][0]) => Promise<Questions[Name][1]> } = {
     open: async ({ welding, ...source }) => {
       this.#mesh = await meshOf(source);

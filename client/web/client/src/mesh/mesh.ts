@@ -48,7 +48,7 @@ export interface Bounds {
 }
 
 /** The bounds of all positions, or of those that faces use. */
-export function boundsOf(positions: Float32Array, faces?: Uint32Array): Bounds {
+export function boundsOf(positions: Float32Array | Float64Array, faces?: Uint32Array): Bounds {
   const min: [number, number, number] = [Infinity, Infinity, Infinity];
   const max: [number, number, number] = [-Infinity, -Infinity, -Infinity];
   const count = faces?.length ?? positions.length / 3;

@@ -1,6 +1,7 @@
+import { unforeseen } from "../errors.js";
 import { Desk } from "./desk.js";
 import { FileFault } from "./fault.js";
-import type { Answer, Question } from "./open_mesh.js";
+import type { Answer, Question, ToldError } from "./open_mesh.js";
 
 // The worker of an OpenMesh: answers in the order in which it is asked.
 const scope = globalThis as unknown as {
@@ -20,9 +21,14 @@ async function reply({ id, name, asked }: Question): Promise<void> {
     const given = isKept ? copied(answer) : answer;
     scope.postMessage({ id, answer: given }, buffersIn(given));
   } catch (thrown) {
-    const { message } = thrown as Error;
-    scope.postMessage(thrown instanceof FileFault ? { id, fault: message } : { id, error: message }, []);
+    const isFault = thrown instanceof FileFault;
+    scope.postMessage(isFault ? { id, fault: thrown.message } : { id, error: told(thrown) }, []);
   }
+}
+
+function told(thrown: unknown): ToldError {
+  const { code, message, reason, element, limit } = unforeseen(thrown);
+  return { code, message, reason, element, limit };
 }
 
 /** With new arrays, which leaves the copying to this thread: what is not handed over is copied by both. */

@@ -31,8 +31,7 @@ export function readObj(name: string, text: string): Mesh {
     } else if (key === "f") {
       const corners = values.map((word) => cornerOf(word, builder.vertexCount));
       builder.polygon(corners, `${name}, line ${number}`);
-      least = Math.min(least, ...corners);
-      most = Math.max(most, ...corners);
+      for (const corner of corners) [least, most] = [Math.min(least, corner), Math.max(most, corner)];
     } else if (key !== undefined && Object.hasOwn(beside, key)) {
       builder.leftAside(beside[key]!);
     }

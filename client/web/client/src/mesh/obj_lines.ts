@@ -11,8 +11,9 @@ export interface ObjLine {
 export function* logicalLines(text: string): Generator<ObjLine> {
   const lines = text.split(text.includes("\n") ? "\n" : "\r");
   for (let k = 0; k < lines.length; ++k) {
-    let line = lines[k]!;
-    while (/\\\r?$/.test(line) && k + 1 < lines.length) line = `${line}\n${lines[++k]!}`;
+    const begin = k;
+    while (/\\\r?$/.test(lines[k]!) && k + 1 < lines.length) ++k;
+    const line = k === begin ? lines[k]! : lines.slice(begin, k + 1).join("\n");
     const plain = line.replace(/\\\r?\n/g, " ").replace(/(^|\s)#.*/s, "");
     const words = plain.split(/\s+/).filter((word) => word !== "");
     yield { text: line, words, number: k + 1 };

@@ -1,6 +1,7 @@
-import { LpdeformError } from "../errors.js";
+import { type ErrorCode, type ErrorDetails, LpdeformError } from "../errors.js";
 import type { Packed, Shaded, Unpacked, Weld } from "../types.js";
-import { type Derived, know, usualWelding, type Welding, weldOf } from "./derived.js";
+import { checkKeys } from "../key_checks.js";
+import { checkWelding, type Derived, know, usualWelding, type Welding, weldOf } from "./derived.js";
 import { Desk, type Opening, type PullRequest, type Questions, type Source } from "./desk.js";
 import { FileFault } from "./fault.js";
 import type { Mesh } from "./mesh.js";
@@ -19,20 +20,25 @@ export interface ReadOptions {
 export type Question = {
   [Name in keyof Questions]: { id: number; name: Name; asked: Questions[Name][0] };
 }[keyof Questions];
-export type Answer = { id: number } & ({ answer: unknown } | { fault: string } | { error: string });
+export type Answer = { id: number } & ({ answer: unknown } | { fault: string } | { error: ToldError });
+
+/** An LpdeformError as a worker can tell it. */
+export type ToldError = ErrorDetails & { code: ErrorCode; message: string };
 
 /** Below this size a page is as quick by itself. */
 const smallBytes = 200_000;
 
 /** A reply is waited for. */
 interface Waiting {
+  /** Undefined if its memory was handed over, so it cannot be asked again. */
+  question: Question | undefined;
   done: (answer: unknown) => void;
   failed: (error: unknown) => void;
 }
 
 /**
  * A mesh, what is needed to show it, and the worker that has found that and goes on with the frames of a session (`shading` of
- * openSession()). If the mesh is small, or the page can have no worker, the page does all that by itself.
+ * openSession()). If the mesh is small, or the page can have no worker, or the worker ends by itself, the page does all that.
  */
 export class OpenMesh {
   readonly mesh: Mesh;
@@ -45,10 +51,15 @@ export class OpenMesh {
   ) {
     this.mesh = mesh ?? (source as { mesh: Mesh }).mesh;
     this.#derived = this.#know(derived);
+    line.goOnWith(this.mesh);
   }
 
-  /** Rejects with a FileFault that names the place in the file. */
+  /**
+   * Rejects with a FileFault that names the place in the file, or with an LpdeformError: WELD_TOLERANCE, UNKNOWN_KEY, ARRAY_TYPE
+   * or WELD_TOO_DENSE for `welding`.
+   */
   static async from(source: Source, welding: Welding = usualWelding): Promise<OpenMesh> {
+    checkWelding(welding);
     const line = Line.to(isLarge(source));
     try {
       return new OpenMesh(line, source, await line.ask("open", { ...source, welding }));
@@ -80,8 +91,9 @@ export class OpenMesh {
     return weldOf(this.#derived);
   }
 
-  /** Finds again what is one. What is drawn changes with it. */
+  /** Finds again what is one. What is drawn changes with it. Rejects as from() does; then all stays as it was. */
   async reweld(welding: Welding): Promise<Derived> {
+    checkWelding(welding);
     return (this.#derived = this.#know(await this.line.ask("weld", welding)));
   }
 
@@ -119,8 +131,10 @@ export class OpenMesh {
   }
 }
 
-/** Reads OBJ, OFF, PLY, STL, GLB or glTF by the ending of the file's name. Rejects with a FileFault. */
-export function readMesh(file: File, { beside = [], welding }: ReadOptions = {}): Promise<OpenMesh> {
+/** Reads OBJ, OFF, PLY, STL, GLB or glTF by the ending of the file's name. Rejects as OpenMesh.from() does. */
+export async function readMesh(file: File, options: ReadOptions = {}): Promise<OpenMesh> {
+  checkKeys(options, { beside: true, welding: true } satisfies Record<keyof ReadOptions, true>, "options");
+  const { beside = [], welding } = options;
   return OpenMesh.from({ file, beside }, welding);
 }
 
@@ -140,15 +154,18 @@ class WorkerGone extends LpdeformError {
 /** Asks a desk: one in a worker, or one in the page. */
 class Line {
   readonly #waiting = new Map<number, Waiting>();
+  #worker: Worker | undefined;
   #desk: Desk | undefined;
+  #mesh: Mesh | undefined;
   #lastId = 0;
   #isClosed = false;
 
-  private constructor(readonly worker: Worker | undefined) {
+  private constructor(worker: Worker | undefined) {
+    this.#worker = worker;
     if (!worker) this.#desk = new Desk();
     else {
       worker.onmessage = ({ data }: MessageEvent<Answer>) => this.#take(data);
-      worker.onerror = () => this.close();
+      worker.onerror = worker.onmessageerror = () => this.#workerEnded();
     }
   }
 
@@ -163,7 +180,12 @@ class Line {
   }
 
   get isWorker(): boolean {
-    return this.worker !== undefined;
+    return this.#worker !== undefined;
+  }
+
+  /** The mesh is open. If the worker ends, the page answers for it. */
+  goOnWith(mesh: Mesh): void {
+    this.#mesh = mesh;
   }
 
   ask<Name extends keyof Questions>(
@@ -174,22 +196,37 @@ class Line {
     if (this.#isClosed) return Promise.reject(new WorkerGone());
     if (this.#desk) return this.#desk.answer(name, asked);
     const id = ++this.#lastId;
-    this.worker!.postMessage({ id, name, asked } as Question, transfer);
-    return new Promise((done, failed) => this.#waiting.set(id, { done: done as Waiting["done"], failed }));
+    const asking = { id, name, asked } as Question;
+    this.#worker!.postMessage(asking, transfer);
+    const question = transfer.length > 0 ? undefined : asking;
+    return new Promise((done, failed) => this.#waiting.set(id, { question, done: done as Waiting["done"], failed }));
   }
 
   close(): void {
     this.#isClosed = true;
-    this.worker?.terminate();
+    this.#worker?.terminate();
     for (const { failed } of this.#waiting.values()) failed(new WorkerGone());
+    this.#waiting.clear();
+  }
+
+  #workerEnded(): void {
+    if (!this.#mesh) return this.close();
+    this.#worker?.terminate();
+    this.#worker = undefined;
+    const desk = (this.#desk = new Desk(this.#mesh));
+    for (const { question, done, failed } of this.#waiting.values()) {
+      if (question) desk.answer(question.name, question.asked).then(done, failed);
+      else failed(new WorkerGone());
+    }
     this.#waiting.clear();
   }
 
   #take(data: Answer): void {
     const waiting = this.#waiting.get(data.id);
     this.#waiting.delete(data.id);
-    if ("fault" in data) waiting?.failed(new FileFault(data.fault));
-    else if ("error" in data) waiting?.failed(new Error(data.error));
-    else waiting?.done(data.answer);
+    if ("answer" in data) return waiting?.done(data.answer);
+    if ("fault" in data) return waiting?.failed(new FileFault(data.fault));
+    const { code, message, ...details } = data.error;
+    waiting?.failed(new LpdeformError(code, message, details));
   }
 }

@@ -6,6 +6,9 @@ import { readOff } from "./off.js";
 import { readPly } from "./ply.js";
 import { readStl } from "./stl.js";
 
+/** The endings of names that parseMesh() reads. */
+export const readable = /\.(glb|gltf|off|obj|ply|stl)$/i;
+
 /** Reads a mesh file by the ending of its name. `beside`: what was opened with it, by name. Throws a FileFault. */
 export function parseMesh(name: string, bytes: Uint8Array, beside?: ReadonlyMap<string, Uint8Array>): Mesh {
   switch (name.toLowerCase().split(".").at(-1)) {
@@ -21,9 +24,7 @@ export function parseMesh(name: string, bytes: Uint8Array, beside?: ReadonlyMap<
     case "stl":
       return readStl(name, bytes);
     default:
-      throw new FileFault(
-        `${name} is not a mesh that can be read: GLB, glTF, OFF, OBJ, PLY, STL, FBX, DAE and 3MF can.`,
-      );
+      throw new FileFault(`${name} is not a mesh that can be read: GLB, glTF, OFF, OBJ, PLY and STL can.`);
   }
 }
 

@@ -1,8 +1,10 @@
+import { LpdeformError } from "../errors.js";
+import { distance } from "./adjacency.js";
 import { boundsOf, type Mesh } from "./mesh.js";
 import { Pairs } from "./pairs.js";
 
 /**
- * Vertices on open borders that are in the same place. Files of game engines have them where texture coordinates or normals
+ * Vertices that are in the same place. Files of game engines have them where texture coordinates or normals
  * change along a seam. The surface holds together only if such vertices count as one.
  */
 export class Seams {
@@ -50,29 +52,74 @@ export class Seams {
   }
 }
 
+/** The server's own tolerance, and the largest at which it takes groups. */
+export const usualTolerance = 1e-6;
+
 /**
- * Undefined if no vertices on borders are in the same place. `tolerance`: how far apart they may be, as a share of the diagonal; what
- * lies between two of them is joined to both.
+ * Undefined if no two vertices are in the same place. `tolerance`: how far apart they may be, as a share of the diagonal. Up to
+ * usualTolerance, vertices on open borders are looked at, and each is at most so far from the first of its place, as servers want it
+ * of groups. Above, servers find the places themselves, and this finds the same: all vertices are looked at, and what lies
+ * between two of them is joined to both. Throws an LpdeformError (WELD_TOO_DENSE) where a server would.
  */
 export function seamsOf(mesh: Mesh, tolerance: number): Seams | undefined {
   const positions = mesh.exact ?? mesh.positions;
-  const border = borderVertices(mesh.faces);
-  if (border.length === 0) return undefined;
   const groups = Uint32Array.from({ length: positions.length / 3 }, (_, vertex) => vertex);
+  const isAny =
+    tolerance > usualTolerance ? joinAll(positions, tolerance, groups) : joinBorders(mesh, tolerance, groups);
+  return isAny ? Seams.of(groups, mesh.faces) : undefined;
+}
+
+type Numbers = Float32Array | Float64Array;
+
+function joinBorders(mesh: Mesh, tolerance: number, groups: Uint32Array): boolean {
+  const positions = mesh.exact ?? mesh.positions;
+  const border = borderVertices(mesh.faces);
+  if (border.length === 0) return false;
+  const { diagonal } = boundsOf(positions, mesh.faces);
+  const places = new Places(positions, tolerance * diagonal, cellShare * diagonal);
+  let isAny = false;
+  for (const vertex of border) {
+    const [first] = places.near(vertex).sort((a, b) => a - b);
+    if (first === undefined) places.add(vertex);
+    else {
+      groups[vertex] = first;
+      isAny = true;
+    }
+  }
+  return isAny;
+}
+
+function joinAll(positions: Numbers, tolerance: number, groups: Uint32Array): boolean {
+  const { diagonal } = boundsOf(positions);
+  const places = new Places(positions, tolerance * diagonal, 0);
   const first = (vertex: number) => {
     while (groups[vertex] !== vertex) vertex = groups[vertex] = groups[groups[vertex]!]!;
     return vertex;
   };
   let isAny = false;
-  const { diagonal } = boundsOf(mesh.positions, mesh.faces);
-  forEachInOnePlace(positions, border, tolerance * diagonal, cellShare * diagonal, (a, b) => {
-    const [low, high] = [first(a), first(b)].sort((one, other) => one - other) as [number, number];
-    groups[high] = low;
-    isAny = true;
-  });
-  if (!isAny) return undefined;
+  for (let vertex = 0; vertex < groups.length; ++vertex) {
+    const near = places.near(vertex);
+    for (const other of near) {
+      const [a, b] = [first(vertex), first(other)];
+      groups[Math.max(a, b)] = Math.min(a, b);
+    }
+    isAny ||= near.length > 0;
+    if (!near.some((other) => distance(positions, vertex, other) === 0)) places.add(vertex);
+    if (places.distances > mostDistances * groups.length) throw tooDense(tolerance);
+  }
   for (let vertex = 0; vertex < groups.length; ++vertex) groups[vertex] = first(vertex);
-  return Seams.of(groups, mesh.faces);
+  return isAny;
+}
+
+/** As servers have it, for each vertex. */
+const mostDistances = 1000;
+
+function tooDense(tolerance: number): LpdeformError {
+  return new LpdeformError(
+    "invalid_argument",
+    `Too many different vertices lie within ${tolerance} of the diagonal of each other to be welded by position.`,
+    { reason: "WELD_TOO_DENSE", element: "weld tolerance", limit: `tolerance < ${tolerance}` },
+  );
 }
 
 /** The vertices of edges that belong to one face only, ascending. */
@@ -92,47 +139,63 @@ function borderVertices(faces: Uint32Array): number[] {
   return [...border].sort((a, b) => a - b);
 }
 
-type Numbers = Float32Array | Float64Array;
-
-/** The size of cells, as a share of the diagonal: such a cell seldom holds two places. */
+/** The least size of cells, as a share of the diagonal: such a cell seldom holds two places of a border. */
 const cellShare = 1e-4;
 
-/** Visits every pair that is at most `distance` apart, using cells of space that are larger than that. */
-function forEachInOnePlace(
-  positions: Numbers,
-  vertices: readonly number[],
-  distance: number,
-  leastSize: number,
-  found: (a: number, b: number) => void,
-): void {
-  const size = Math.max(2 * distance, leastSize);
-  const cells = new Map<string, number[]>();
-  for (const vertex of vertices) {
-    let isThere = false; // exactly the same place: one vertex stands for all of them
-    for (const other of cellsNear(positions, vertex, size, distance).flatMap((cell) => cells.get(cell) ?? [])) {
-      const far = distanceBetween(positions, vertex, other);
-      if (far <= distance) found(other, vertex);
-      isThere ||= far === 0;
+/** Vertices in cells of space that are larger than `distance`. Cells share slots of a table; what is far away is left out by its distance. */
+class Places {
+  /** How many distances were computed. */
+  distances = 0;
+  readonly #size: number;
+  readonly #newest: Int32Array; // for each slot
+  readonly #before: Int32Array; // for each vertex: the one added before it to its slot
+
+  constructor(
+    readonly positions: Numbers,
+    readonly distance: number,
+    leastSize: number,
+  ) {
+    const count = positions.length / 3;
+    this.#size = Math.max(2 * distance, leastSize);
+    this.#newest = new Int32Array(2 ** Math.ceil(Math.log2(2 * count + 1))).fill(-1);
+    this.#before = new Int32Array(count);
+  }
+
+  add(vertex: number): void {
+    const [slot] = this.#slotsNear(vertex, 0) as [number];
+    this.#before[vertex] = this.#newest[slot]!;
+    this.#newest[slot] = vertex;
+  }
+
+  /** Those added that are at most `distance` from the vertex; some of them may be there twice. */
+  near(vertex: number): number[] {
+    const found: number[] = [];
+    for (const slot of this.#slotsNear(vertex, this.distance)) {
+      for (let other = this.#newest[slot]!; other >= 0; other = this.#before[other]!, ++this.distances) {
+        if (distance(this.positions, vertex, other) <= this.distance) found.push(other);
+      }
     }
-    if (isThere) continue;
-    const [own] = cellsNear(positions, vertex, size, 0) as [string];
-    const inCell = cells.get(own);
-    if (inCell) inCell.push(vertex);
-    else cells.set(own, [vertex]);
+    return found;
   }
-}
 
-/** The cells that may hold something within `reach` of the vertex. */
-function cellsNear(positions: Numbers, vertex: number, size: number, reach: number): string[] {
-  let cells = [""];
-  for (let axis = 0; axis < 3; ++axis) {
-    const value = positions[3 * vertex + axis]!;
-    const along = new Set([Math.floor((value - reach) / size), Math.floor((value + reach) / size)]);
-    cells = cells.flatMap((cell) => [...along].map((step) => `${cell} ${step}`));
+  /** The slots of the cells that may hold something within `reach` of the vertex. */
+  #slotsNear(vertex: number, reach: number): number[] {
+    const slots: number[] = [];
+    const [xs, ys, zs] = [0, 1, 2].map((axis) => this.#cellsAlong(this.positions[3 * vertex + axis]!, reach));
+    for (const x of xs!) {
+      for (const y of ys!) {
+        for (const z of zs!) {
+          const mixed = Math.imul(x, 0x9e3779b1) ^ Math.imul(y, 0x85ebca6b) ^ Math.imul(z, 0xc2b2ae35);
+          slots.push((mixed ^ (mixed >>> 15)) & (this.#newest.length - 1));
+        }
+      }
+    }
+    return slots;
   }
-  return cells;
-}
 
-function distanceBetween(positions: Numbers, a: number, b: number): number {
-  return Math.hypot(...[0, 1, 2].map((axis) => positions[3 * a + axis]! - positions[3 * b + axis]!));
+  #cellsAlong(value: number, reach: number): number[] {
+    const low = Math.floor((value - reach) / this.#size);
+    const high = Math.floor((value + reach) / this.#size);
+    return low === high ? [low] : [low, high];
+  }
 }

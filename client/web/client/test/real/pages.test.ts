@@ -111,7 +111,11 @@ test("a file: a worker reads, welds and shades it, and says what is wrong with o
   await until(page, isStraight);
   await page.getByLabel("Shift").fill("0.4");
   await until(page, ({ left, right }) => right > 1.5 * left);
-  expect(page.workers()).toHaveLength(1);
+  await choose(tubeObj().replace("v ", "# another one\nv "));
+  await until(page, isStraight);
+  await page.getByLabel("Shift").fill("0.3");
+  await until(page, ({ left, right }) => right > 1.3 * left);
+  expect(page.workers()).toHaveLength(1); // that of the first is gone
   expect(errors).toEqual([]);
 }, 120_000);
 

@@ -1,8 +1,9 @@
 import type { FrameShading } from "lpdeform-client";
-import { OpenMesh, type Welding } from "lpdeform-client/mesh";
+import { FileFault, OpenMesh, type Welding } from "lpdeform-client/mesh";
 import { derivedOf, isKnown, usualWelding } from "lpdeform-client/mesh/derived";
 import type { PullRequest, Source } from "lpdeform-client/mesh/desk";
 import type { Mesh } from "lpdeform-client/mesh/mesh";
+import { readable } from "lpdeform-client/mesh/read";
 import type { StoredMesh } from "lpdeform-client/mesh/stored";
 
 /** From this number of vertices on, a page is busy for more than some milliseconds with a frame. */
@@ -17,7 +18,10 @@ export interface MeshWorker extends FrameShading {
 }
 
 /** Reads a mesh file. `beside`: files that were opened with it. Rejects with a FileFault. */
-export function openedMesh(file: File, beside: readonly File[]): Promise<Mesh> {
+export async function openedMesh(file: File, beside: readonly File[]): Promise<Mesh> {
+  if (!readable.test(file.name)) {
+    throw new FileFault(`${file.name} is not a mesh that can be read: GLB, glTF, OFF, OBJ, PLY, STL, FBX, DAE and 3MF can.`);
+  }
   return meshFrom({ file, beside });
 }
 
@@ -62,7 +66,7 @@ export function keepOnly(mesh: Mesh): void {
   for (const [other, one] of all) {
     if (other === mesh) continue;
     all.delete(other);
-    void one.then((it) => it.close());
+    one.then((it) => it.close()).catch(() => undefined); // it could not be opened
   }
 }
 
@@ -71,5 +75,6 @@ function openOf(mesh: Mesh, welding: Welding): Promise<OpenMesh> {
   if (known) return known;
   const one = OpenMesh.from({ mesh }, welding);
   all.set(mesh, one);
+  one.catch(() => all.get(mesh) === one && all.delete(mesh)); // the next question tries again
   return one;
 }

@@ -276,7 +276,7 @@ export class Live {
         await taken;
       }
     } catch (thrown) {
-      const error = thrown as LpdeformError;
+      const error = thrown instanceof LpdeformError ? thrown : brokenHere(thrown);
       askedMs = error.retryAfterMs;
       if (this.#over.signal.aborted) return { hadFrames, askedMs };
       this.#setStatus(this.watched ? watchedStatus(error, statusAtEnd(error)) : statusAtEnd(error));
@@ -328,6 +328,11 @@ export class Live {
     this.status = status;
     this.watcher.status(status);
   }
+}
+
+/** The page itself failed with a frame. */
+function brokenHere(thrown: unknown): LpdeformError {
+  return new LpdeformError("internal", String(thrown), { reason: "EXCEPTION" }, thrown);
 }
 
 /** Ends early if the signal aborts. */

@@ -45,6 +45,7 @@ export const notAnswering: Status = {
 
 /** The status when nothing is tried again until the user starts again. */
 export function statusAtEnd(error: LpdeformError): Status {
+  if (error.reason === "EXCEPTION") return say("away", "This page failed with a frame", `${kept}. Starting again…`);
   if (error.reason !== "FRAME_PARTS" && error.reason !== "FRAME_VERTICES") return statusOf(error);
   const advice = "Page and server may be of different versions: reload the page.";
   return say("refused", "The server's frames do not fit this mesh", `${advice} ${kept}.`);

@@ -40,7 +40,7 @@ export function reportPanel(app: App): HTMLElement {
     "Weld seams",
     true,
     (isOn) => void app.weld({ tolerance: app.view.now.weldTolerance, isOn }),
-    "Vertices in one place on open borders move as one; saved files have them all",
+    "Vertices in one place move as one; saved files have them all",
   );
   const reach = el("select", { aria: { label: "How far apart welded vertices may be" } });
   for (const tolerance of tolerances) {
@@ -48,7 +48,7 @@ export function reportPanel(app: App): HTMLElement {
     reach.append(el("option", { value: String(tolerance), textContent: text }));
   }
   reach.title =
-    "Vertices on open borders that are no farther apart count as one; the size is the diagonal of the mesh's bounds";
+    "Vertices that are no farther apart count as one: up to 0.0001 % those on open borders, above that all of them; the size is the diagonal of the mesh's bounds";
   reach.addEventListener("change", () => {
     const isOn = app.view.now.isWelded;
     void app.weld({ tolerance: Number(reach.value), isOn }).then(showSeams); // also what holds if it is refused

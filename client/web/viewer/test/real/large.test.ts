@@ -25,6 +25,44 @@ const withoutWorkers = () => {
   } as unknown as typeof Worker;
 };
 
+/** So that a test can end them. */
+const withKeptWorkers = () => {
+  const kept: Worker[] = [];
+  const Own = window.Worker;
+  window.Worker = class extends Own {
+    constructor(url: string | URL, options?: WorkerOptions) {
+      super(url, options);
+      kept.push(this);
+    }
+  };
+  Object.assign(window, { kept });
+};
+
+it("goes on when the mesh's worker ends", async () => {
+  const user = await User.open(`${service.url}/?shape=sheet&detail=coarse`);
+  await user.page.evaluate(withKeptWorkers);
+  await user.settled();
+  await user.openFiles({ name: "ring.obj", content: ringObj(around, across) });
+  await user.until(`window.__lpdeform.app.mesh.name === "ring.obj"`);
+  const onRing = (turn: number) => user.vertexOnPage(ringVertex(around, across, turn, 0.2));
+  for (const turn of [0.62, 0.88]) {
+    const { x, y } = await onRing(turn);
+    await user.page.mouse.click(x, y);
+  }
+  await user.settled();
+  await user.page.evaluate("window.kept.forEach((one) => { one.terminate(); one.dispatchEvent(new Event('error')); })");
+  await expect.poll(() => user.page.workers().length).toBe(0);
+  const [from, far] = await Promise.all([onRing(0.88), onRing(0.8)]);
+  await user.drag(from, 60, -30);
+  await user.settled();
+  const [after, followed] = await Promise.all([onRing(0.88), onRing(0.8)]);
+  expect(Math.hypot(after.x - from.x - 60, after.y - from.y + 30)).toBeLessThan(2);
+  expect(Math.hypot(followed.x - far.x, followed.y - far.y)).toBeGreaterThan(1);
+  expect(await user.ask("status()")).toBe("live");
+  expect(user.errors).toEqual([]);
+  await user.close();
+});
+
 it.each([true, false])("follows a handle between frames; with workers: %s", async (hasWorkers) => {
   const user = await User.open(`${service.url}/?shape=sheet&detail=coarse`);
   if (!hasWorkers) await user.page.evaluate(withoutWorkers);

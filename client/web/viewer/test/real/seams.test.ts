@@ -122,6 +122,32 @@ it("how far apart welded vertices may be is said, and can be chosen; the choice 
   expect(user.errors).toEqual([]);
 });
 
+it("within a larger distance vertices inside of surfaces count, too, and are painted together", async () => {
+  const inside = 5 * (columns + 1) + 1;
+  const tip = [0, 1, 2].map((axis) => tube.positions[3 * inside + axis]!);
+  const beside = [0, 1, 2].flatMap((way) => tip.map((value, axis) => value + (axis === way ? 0.05 : 0)));
+  const at = (corner: number) => vertexCount + corner;
+  const solid = [0, 1, 3, 1, 2, 3, 2, 0, 3, 0, 2, 1].map(at);
+  const touched = {
+    ...tube,
+    positions: Float32Array.from([...tube.positions, ...tip, ...beside]),
+    faces: Uint32Array.from([...tube.faces, ...solid]),
+  };
+  await user.openFiles({ name: "touched.off", content: writeOff(touched) });
+  await user.until(`window.__lpdeform.app.facts.now.report?.weldedVertices === ${rows + 1}`); // on borders
+  await openPanel();
+  await user.page.getByLabel("How far apart welded vertices may be").selectOption("0.01 % of the size");
+  await user.until(`window.__lpdeform.app.facts.now.report?.weldedVertices === ${rows + 2}`);
+  await user.ask("app.view.set({ tool: 'paint', radius: 0.1 })");
+  const { x, y } = await user.vertexOnPage(inside);
+  await user.drag({ x, y }, 2, 2);
+  await expect.poll(() => user.ask(`document().paintedP[${inside}]`)).toBe(1);
+  expect(await user.ask(`document().paintedP[${at(0)}]`)).toBe(1);
+  await user.settled();
+  expect(await user.page.locator(".banner").isHidden()).toBe(true);
+  expect(user.errors).toEqual([]);
+});
+
 it("a mesh without seams has no switch", async () => {
   await user.page.getByLabel("Shape").selectOption("bar");
   await user.settled();
