@@ -226,8 +226,9 @@ export class Pane {
       const images = await decoded(texturing.layers);
       if (this.stage.surface !== surface) return closeAll(images);
       const unknown = new Set(texturing.layers.map(({ image }, k) => (images[k] ? undefined : image)).filter(Boolean)).size;
+      const few = unknown === 1 ? "One texture" : `${unknown} textures`;
       if (unknown > 0)
-        this.watcher.notice(`${unknown} textures of ${name} are too large, or images that this browser does not show.`);
+        this.watcher.notice(`${few} of ${name} cannot be shown: too large, or no image that this browser knows.`);
       const { missing = [] } = texturing;
       if (missing.length > 0) this.watcher.notice(`Open these images together with ${name} to see them: ${someOf(missing)}.`);
       surface.dress((indices, makeMaterial) => new Textured({ indices }, texturing, images, makeMaterial));
