@@ -2,7 +2,7 @@ import { afterEach, expect, it, vi } from "vitest";
 import { LpdeformError, type Notice } from "lpdeform-client";
 import { Live } from "../src/link/live.js";
 import { addHandle, changeHandle, type Document, emptyDocument } from "../src/model/document.js";
-import { lowerText, percent } from "../src/model/words.js";
+import { lowerText, percent, someOf } from "../src/model/words.js";
 import { betterText } from "../src/ui/messages.js";
 
 /** A session that the test speaks for. */
@@ -118,4 +118,10 @@ it("what a better shape saves is not rounded up to a whole percent", () => {
 it("beside the gap stands what is known of lower minima, and otherwise that there may be one", () => {
   expect(lowerText(0.0714)).toBe("known, 7\u00a0% less energy");
   expect(lowerText(undefined)).toBe("may exist");
+});
+
+it("of many names a line has the first ones", () => {
+  expect(someOf(["a", "b"])).toBe("a, b");
+  expect(someOf(Array.from({ length: 2005 }, (_, k) => `${k}`))).toBe("0, 1, 2, 3, 4 and 2,000 more");
+  expect(someOf(["a".repeat(1e6)])).toHaveLength(81);
 });

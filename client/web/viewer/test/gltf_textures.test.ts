@@ -3,6 +3,7 @@ import { expect, it, vi } from "vitest";
 import { readGltfTextures } from "../src/io/gltf_textures.js";
 import { parseMesh } from "lpdeform-client/mesh/read";
 import { readGltfDocument, writeGlb } from "lpdeform-client/mesh/gltf_document";
+import { gathered } from "../src/model/texturing.js";
 import { decoded, Textured } from "../src/stage/textured.js";
 import { columns, makeGlb } from "./made_glb.js";
 import { pngOf } from "./png.js";
@@ -46,10 +47,83 @@ it("primitives with one image share it, and those with other places for the same
   ]);
 });
 
+/** Images of these sizes, or of the other one; without a size, they cannot be shown. */
+function stubImages(sizes: ReadonlyMap<Blob, readonly [number, number]>, other?: readonly [number, number]): void {
+  const known = new Map<string, readonly [number, number] | undefined>();
+  vi.spyOn(URL, "createObjectURL").mockImplementation((image) => {
+    const address = `image ${known.size}`;
+    known.set(address, sizes.get(image as Blob) ?? other);
+    return address;
+  });
+  class FakeImage {
+    naturalWidth = 0;
+    naturalHeight = 0;
+    onload = () => undefined;
+    onerror = () => undefined;
+    set src(address: string) {
+      const size = known.get(address);
+      if (size) [this.naturalWidth, this.naturalHeight] = size;
+      queueMicrotask(size ? this.onload : this.onerror);
+    }
+  }
+  vi.stubGlobal("Image", FakeImage);
+}
+
+const layerWith = (image: Blob) => ({ firstFace: 0, faceCount: 1, image, colour: [1, 1, 1] as const, isRepeated: true });
+
+it("an image of too many pixels is not decoded, and many are decoded smaller, one after the other", async () => {
+  const [huge, broken, a, b] = [1, 2, 3, 4].map((k) => new Blob([`${k}`])) as [Blob, Blob, Blob, Blob];
+  stubImages(
+    new Map([
+      [huge, [100_000, 100_000]],
+      [a, [10_000, 10_000]],
+      [b, [10_000, 5000]],
+    ]),
+  );
+  const asked: [Blob, number, number][] = [];
+  let [running, most] = [0, 0];
+  vi.stubGlobal("createImageBitmap", async (image: Blob, { resizeWidth, resizeHeight }: ImageBitmapOptions) => {
+    most = Math.max(most, ++running);
+    asked.push([image, resizeWidth!, resizeHeight!]);
+    await Promise.resolve();
+    --running;
+    return { close: () => undefined };
+  });
+  const images = await decoded([huge, broken, a, b, a].map(layerWith));
+  expect(images.map((image) => image !== undefined)).toEqual([false, false, true, true, true]);
+  expect([images[2] === images[4], most, asked.map(([image]) => image)]).toEqual([true, 1, [a, b]]);
+  const pixels = asked.reduce((sum, [, width, height]) => sum + width * height, 0);
+  expect(pixels).toBeLessThanOrEqual(2 ** 27);
+  expect(pixels).toBeGreaterThan(0.99 * 2 ** 27);
+});
+
+it("faces that look alike are one layer, in any order in the file", () => {
+  const image = new Blob(["a"]);
+  const layer = (firstFace: number, other: object) => ({ ...layerWith(image), firstFace, ...other });
+  const layers = [layer(0, {}), layer(1, { isRepeated: false }), layer(2, { faceCount: 2 })];
+  const { coordinates, corners } = { coordinates: Float32Array.of(0, 0), corners: new Uint32Array(12) };
+  const texturing = gathered({ coordinates, corners, layers });
+  expect(texturing.layers.map(({ firstFace, faceCount }) => [firstFace, faceCount])).toEqual([
+    [0, 3],
+    [3, 1],
+  ]);
+  expect([...texturing.order!]).toEqual([0, 2, 3, 1]);
+  const indices = Uint32Array.from({ length: 12 }, (_, k) => k);
+  const material = () => new ShaderMaterial({ uniforms: { plain: { value: 0 }, colourful: { value: 0 } } });
+  const textured = new Textured({ indices }, texturing, [], material);
+  expect([...textured.object.geometry.index!.array]).toEqual([0, 1, 2, 6, 7, 8, 9, 10, 11, 3, 4, 5]);
+
+  const many = Array.from({ length: 100_000 }, (_, k) => layer(k, { isRepeated: k % 2 === 0 }));
+  expect(gathered({ coordinates, corners, layers: many }).layers).toHaveLength(2);
+  const different = many.slice(0, 513).map((one, k) => ({ ...one, colour: [k / 513, 0, 0] as const }));
+  expect(() => gathered({ coordinates, corners, layers: different })).toThrow("513 different materials; this page shows 512");
+});
+
 it("layers that show an image alike share its decoding and its texture, and close it once", async () => {
   let [decodings, closings] = [0, 0];
   const bitmap = { close: () => ++closings } as unknown as ImageBitmap;
   vi.stubGlobal("createImageBitmap", async () => (++decodings, bitmap));
+  stubImages(new Map(), [2, 1]);
   const image = new Blob([picture]);
   const layers = [true, true, false].map((isRepeated, k) => {
     const colour = [1, 1, 1] as const;

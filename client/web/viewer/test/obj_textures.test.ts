@@ -1,7 +1,7 @@
 import { parseMesh } from "lpdeform-client/mesh/read";
 import { expect, it } from "vitest";
 import { rewriteObj } from "../src/io/obj_rewrite.js";
-import { readObjTextures } from "../src/io/obj_textures.js";
+import { materialFiles, readObjTextures } from "../src/io/obj_textures.js";
 import { storedMesh } from "../src/io/project_mesh.js";
 
 const obj = `mtllib a.mtl
@@ -70,4 +70,35 @@ it("the files are kept with the mesh, and the OBJ that is saved is as it was", (
   expect(parseMesh("a.obj", bytes, new Map([["a.png", encoded]])).materials).toBeUndefined();
   expect(rewriteObj({ ...mesh, obj: mesh.obj! }, mesh.positions)).toBe(obj);
   expect(storedMesh(mesh).arrays).toEqual({ obj: bytes });
+});
+
+it("materials come from the MTL files that the OBJ names, and from the others only if none of those is there", async () => {
+  const other = new Blob(["newmtl plain\nKd 1 0 0\n"]);
+  const own = new Blob([mtl]);
+  for (const files of [
+    { "A.MTL": own, "b.mtl": other },
+    { "b.mtl": other, "A.MTL": own },
+  ]) {
+    expect((await read(files)).layers[1]!.colour[2]).toBe(1);
+  }
+  expect((await read({ "b.mtl": other })).layers[1]!.colour).toEqual([1, 0, 0]);
+  const two = new TextEncoder().encode(obj.replace("a.mtl", "maps/b.mtl a.mtl"));
+  expect((await readObjTextures(two, { "a.mtl": own, "b.mtl": other })).layers[1]!.colour).toEqual([1, 0, 0]); // the first
+});
+
+it("of the files beside an OBJ, those are read that its materials name", async () => {
+  const files = ["a.MTL", "OLD wood.png", "photo.png", "notes.txt"].map((name) => new File([mtl], name));
+  expect((await materialFiles(files)).map(({ name }) => name)).toEqual(["a.MTL", "OLD wood.png"]);
+});
+
+it("a material may change at every face, and the page goes on while it is read", async () => {
+  const count = 30_000;
+  const lines = Array.from({ length: count }, (_, k) => `usemtl ${k % 2 ? "plain" : "wood, old"}\nf 1 2 3`);
+  const text = `mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n${lines.join("\n")}\n`;
+  let turns = 0;
+  const turning = setInterval(() => ++turns);
+  const { layers } = await readObjTextures(new TextEncoder().encode(text), { "a.mtl": new Blob([mtl]) });
+  clearInterval(turning);
+  expect(layers).toHaveLength(count);
+  expect(turns).toBeGreaterThan(5); // something else had its turn in between
 });

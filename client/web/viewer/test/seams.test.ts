@@ -2,6 +2,7 @@ import { usualWelding } from "lpdeform-client/mesh/derived";
 import { expect, it } from "vitest";
 import { boundsOf, type Mesh } from "lpdeform-client/mesh/mesh";
 import { seamsOf } from "lpdeform-client/mesh/seams";
+import { leastEdge } from "../src/model/least_edge.js";
 import { shapeKinds } from "../src/model/shapes.js";
 import { splitTube } from "./split_tube.js";
 
@@ -135,4 +136,11 @@ it("a heap of single triangles is one surface", () => {
     faces: Uint32Array.from({ length: mesh.faces.length }, (_, corner) => corner),
   };
   expect(new Set(seamsOf(heap, usual)!.groups).size).toBe(mesh.positions.length / 3);
+});
+
+it("the least edge that keeps a tolerance small is one with a length", () => {
+  const positions = Float32Array.of(0, 0, 0, 3, 0, 0, 0, 4, 0, 0, 0, 0);
+  expect(leastEdge({ positions, faces: Uint32Array.of(0, 1, 2) })).toBe(3);
+  expect(leastEdge({ positions, faces: Uint32Array.of(0, 3, 2) })).toBe(4);
+  expect(leastEdge({ positions, faces: Uint32Array.of(0, 3, 0) })).toBe(Infinity);
 });

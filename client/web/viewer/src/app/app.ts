@@ -8,6 +8,7 @@ import { isAlike } from "../model/alike.js";
 import { History, type Steps } from "../model/history.js";
 import { keyPoseOf } from "../model/key_poses.js";
 import { kindOf } from "../model/hold_kinds.js";
+import { leastEdge } from "../model/least_edge.js";
 import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { Mirror, mirrorAxes, type Symmetry } from "../model/mirror.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
@@ -21,6 +22,7 @@ import { symmetric } from "../model/symmetric.js";
 import { firstView, type View } from "../model/view.js";
 import type { Look, Stage } from "../stage/stage.js";
 import { keepOnly, prepare } from "../io/opened.js";
+import { sentence } from "../link/status.js";
 import { watchedMesh } from "../link/watched.js";
 import { Asides, type Kept, weldingOf } from "./asides.js";
 import { type Facts, firstFacts, noMesh } from "./facts.js";
@@ -42,6 +44,9 @@ export class App implements Workbench {
   readonly afterDrawing = new Set<(now: number) => void>();
   #seams: Seams | undefined;
   #watched: string | undefined;
+  #wishedWelding: Welding | undefined;
+  #welded = Promise.resolve();
+  #openings = 0;
   #mirror: { of: readonly unknown[]; mirror: Mirror } | undefined;
   readonly #asides = new Asides();
   #isBroughtBack = false;
@@ -122,6 +127,7 @@ export class App implements Workbench {
   // The work.
 
   openShape(id: string, detail: Detail): void {
+    this.opening();
     this.#openShape(id, detail, this.document);
   }
 
@@ -149,15 +155,28 @@ export class App implements Workbench {
     return this.view.now.isWelded ? this.#seams : undefined;
   }
 
-  /** Sets which vertices along seams move as one. */
-  async weld(welding: Welding): Promise<void> {
+  /** Sets which vertices along seams move as one. Of several wishes the last one counts. If it fails, the user is told. */
+  weld(welding: Welding): Promise<void> {
     const { mesh, diagonal } = this;
-    const share = derivedOf(mesh).shortestEdge / diagonal;
-    if (welding.tolerance > usualWelding.tolerance && welding.tolerance >= share) {
-      return this.notify(`The shortest edge has ${short(100 * share)} % of the size: its ends would be one vertex.`, true);
+    const share = leastEdge(mesh) / diagonal;
+    if (welding.isOn && welding.tolerance > usualWelding.tolerance && welding.tolerance >= share) {
+      this.notify(`The shortest edge has ${short(100 * share)} % of the size: its ends would be one vertex.`, true);
+      return Promise.resolve();
     }
-    await prepare(mesh, welding);
-    if (this.mesh !== mesh || !isKnown(mesh, welding)) return; // another mesh, or another wish, has come since
+    this.#wishedWelding = welding;
+    // One after the other: what was found last is what derivedOf() has.
+    return (this.#welded = this.#welded.then(() => this.#weld(mesh, welding)));
+  }
+
+  async #weld(mesh: Mesh, welding: Welding): Promise<void> {
+    const isWanted = () => this.mesh === mesh && this.#wishedWelding === welding;
+    if (!isWanted()) return;
+    try {
+      await prepare(mesh, welding);
+    } catch (thrown) {
+      return this.notify(`The welding stays as it is. ${sentence((thrown as Error).message)}`, true);
+    }
+    if (!isWanted() || !isKnown(mesh, welding)) return;
     this.#takeWelding();
     this.facts.set({ report: undefined, problem: undefined });
     this.#openPanes();
@@ -176,6 +195,12 @@ export class App implements Workbench {
     for (const pane of this.panes) pane.open(mesh, this.document, this.view.now, this.#watched);
     this.#needsMarks = true;
     this.#documentChanged(performance.now());
+  }
+
+  /** The user begins to open something. The returned function says whether it is still what the user wanted last. */
+  opening(): () => boolean {
+    const own = ++this.#openings;
+    return () => own === this.#openings;
   }
 
   /** `isBroughtBack`: the user has worked on it before. */
@@ -246,7 +271,9 @@ export class App implements Workbench {
   /** Restores work that was set aside, with its history. The present work is set aside instead. */
   async bringBack(id: number): Promise<void> {
     const wanted = this.#asides.find(id);
+    const isNewest = this.opening();
     if (wanted) await prepare(wanted.mesh, weldingOf(wanted.view));
+    if (!isNewest()) return;
     const aside = this.#asides.take(id);
     if (!aside) return;
     this.open(aside.mesh, aside.document, true);

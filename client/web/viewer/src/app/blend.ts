@@ -36,7 +36,7 @@ export class Blend {
       () => this.#restart(),
     );
     app.view.watch(
-      ({ isWelded }) => [isWelded],
+      ({ isWelded, weldTolerance }) => [isWelded, weldTolerance],
       () => this.#restart(),
     );
   }

@@ -3,7 +3,7 @@ import { newGlb } from "../io/write_glb.js";
 import { rewriteGlb } from "../io/gltf_rewrite.js";
 import { readHandleFile, writeHandleFile } from "../io/handlefile.js";
 import { writeObj } from "../io/write_obj.js";
-import { openedMesh } from "../io/opened.js";
+import { keepOnly, openedMesh } from "../io/opened.js";
 import { rewriteObj } from "../io/obj_rewrite.js";
 import { writeOff } from "../io/write_off.js";
 import { writePly } from "../io/write_ply.js";
@@ -29,7 +29,6 @@ const largeBytes = 2e6;
 const isHandles = ({ name }: File) => /\.json$/i.test(name);
 const isProject = ({ name }: File) => /\.lpdeform$/i.test(name);
 const isForeign = ({ name }: File) => /\.(fbx|dae|3mf)$/i.test(name);
-const isOfMaterials = ({ name }: File) => /\.(mtl|png|jpe?g|webp|bmp|gif)$/i.test(name);
 const isMesh = (file: File) => /\.(glb|gltf|off|obj|ply|stl)$/i.test(file.name) || isForeign(file);
 
 interface Exported {
@@ -45,7 +44,8 @@ export class Files {
 
   constructor(readonly app: App) {
     this.#input.type = "file";
-    this.#input.accept = ".glb,.gltf,.bin,.off,.obj,.mtl,.png,.jpg,.jpeg,.webp,.ply,.stl,.fbx,.dae,.3mf,.json,.lpdeform";
+    this.#input.accept =
+      ".glb,.gltf,.bin,.off,.obj,.mtl,.png,.jpg,.jpeg,.webp,.bmp,.gif,.ply,.stl,.fbx,.dae,.3mf,.json,.lpdeform";
     this.#input.multiple = true;
     this.#input.addEventListener("change", () => {
       void this.open([...(this.#input.files ?? [])]);
@@ -75,7 +75,7 @@ export class Files {
     const known = [...projects, ...meshes, ...files.filter(isHandles)];
     for (const file of known.length > 0 ? known : files) {
       try {
-        await this.#openFile(file, besideOf(file, files));
+        if (!(await this.#openFile(file, files))) return;
       } catch (error) {
         const isFault = error instanceof FileFault;
         this.app.notify(isFault ? error.message : `${file.name} cannot be opened: ${(error as Error).message}`, true);
@@ -84,31 +84,35 @@ export class Files {
     }
   }
 
-  async #openFile(file: File, beside: readonly File[]): Promise<void> {
-    if (file.size > mostBytes) {
-      throw new FileFault(`${file.name} has ${short(file.size)}B; this page reads files of ${short(mostBytes)}B at most.`);
-    }
+  /** False if something else is opened in the meantime: then that is what the user wants. */
+  async #openFile(file: File, files: readonly File[]): Promise<boolean> {
+    checkSize(file.name, file.size);
     const done = file.size > largeBytes ? this.app.notifyWhile(`Opening ${file.name}…`) : () => undefined;
     try {
-      if (isProject(file)) await this.#openProject(file);
-      else if (isHandles(file)) this.#openHandles(file.name, await file.text());
-      else if (isForeign(file)) await this.#openForeign(file);
-      else this.#openMesh(await openedMesh(file, beside));
+      if (isProject(file)) return await this.#openProject(file);
+      if (isHandles(file)) return await this.#openHandles(file);
+      if (isForeign(file)) return await this.#openForeign(file);
+      return await this.#openMesh(async () => openedMesh(file, await besideOf(file, files)));
     } finally {
       done();
     }
   }
 
-  async #openForeign(file: File): Promise<void> {
+  async #openForeign(file: File): Promise<boolean> {
     if (file.size > mostForeignBytes) {
       throw new FileFault(
         `${file.name} has ${short(file.size)}B; this page reads such files of ${short(mostForeignBytes)}B at most.`,
       );
     }
-    const { glbOf } = await import("../io/foreign.js");
-    const { glb, left } = await glbOf(file);
-    const gone = left.length > 0 ? `Its ${left.join(" and ")} are not taken over. ` : "";
-    this.#openMesh(await openedMesh(glb, []), `${file.name} is opened as ${glb.name}. ${gone}`);
+    let first = "";
+    const read = async () => {
+      const { glbOf } = await import("../io/foreign.js");
+      const { glb, left } = await glbOf(file);
+      const gone = left.length > 0 ? `Its ${left.join(" and ")} are not taken over. ` : "";
+      first = `${file.name} is opened as ${glb.name}. ${gone}`;
+      return openedMesh(glb, []);
+    };
+    return this.#openMesh(read, () => first);
   }
 
   /** In the doubles of the server's result, which are more precise than the drawn surface. */
@@ -166,10 +170,11 @@ export class Files {
     save(`${this.#stem}.lpdeform`, await saveProject(this.app));
   }
 
-  async #openProject(file: File): Promise<void> {
-    await openProject(this.app, file.name, new Uint8Array(await file.arrayBuffer()));
+  async #openProject(file: File): Promise<boolean> {
+    if (!(await openProject(this.app, file))) return false;
     const count = this.app.document.handles.length;
     this.app.notify(`${file.name}: “${this.app.mesh.name}” with ${count === 1 ? "a handle" : `${count} handles`}.`);
+    return true;
   }
 
   async exportPoses(as: "glb" | "video"): Promise<void> {
@@ -200,7 +205,13 @@ export class Files {
   }
 
   /** `first`: what the user is told before what is said of every mesh. */
-  #openMesh(mesh: Mesh, first = ""): void {
+  async #openMesh(read: () => Promise<Mesh>, first = () => ""): Promise<boolean> {
+    const isNewest = this.app.opening();
+    const mesh = await read();
+    if (!isNewest()) {
+      keepOnly(this.app.mesh);
+      return false;
+    }
     const { name } = mesh;
     const { p, secondP } = this.app.document;
     this.app.open(mesh, { ...emptyDocument, p, secondP });
@@ -210,11 +221,16 @@ export class Files {
     const count = (mesh.positions.length / 3).toLocaleString("en");
     const { seamVertices } = this.app.facts.now;
     const welded = `, ${seamVertices.toLocaleString("en")} of them copies along seams, welded: the panel “Mesh” has a switch`;
-    this.app.notify(`${first}${name}: ${count} vertices${seamVertices > 0 ? welded : ""}.${up}`);
+    this.app.notify(`${first()}${name}: ${count} vertices${seamVertices > 0 ? welded : ""}.${up}`);
+    return true;
   }
 
-  #openHandles(name: string, text: string): void {
+  async #openHandles(file: File): Promise<boolean> {
     const { app } = this;
+    const { name } = file;
+    const { mesh } = app;
+    const text = await file.text();
+    if (app.mesh !== mesh) return false;
     const { seams } = app;
     app.change(
       readHandleFile(text, app.document, app.mesh, (vertices) => seams?.withCopies(vertices) ?? vertices),
@@ -222,6 +238,7 @@ export class Files {
     );
     app.view.set({ selected: app.document.handles.at(-1)!.name });
     app.notify(`${name}: ${app.document.handles.length} handles.`);
+    return true;
   }
 
   #takeDrops(): void {
@@ -241,11 +258,22 @@ export class Files {
   }
 }
 
-/** What is read together with the file. */
-function besideOf(file: File, files: readonly File[]): File[] {
+/** What is read together with the file. Throws a FileFault if it is too much. */
+async function besideOf(file: File, files: readonly File[]): Promise<File[]> {
   const others = files.filter((other) => other !== file);
-  if (/\.gltf$/i.test(file.name)) return others;
-  return /\.obj$/i.test(file.name) ? others.filter(isOfMaterials) : [];
+  const beside = /\.gltf$/i.test(file.name) ? others : /\.obj$/i.test(file.name) ? await materialsOf(others) : [];
+  const bytes = beside.reduce((sum, { size }) => sum + size, file.size);
+  if (beside.length > 0) checkSize(`${file.name} together with the files beside it`, bytes);
+  return beside;
+}
+
+async function materialsOf(files: readonly File[]): Promise<File[]> {
+  return files.length > 0 ? (await import("../io/obj_textures.js")).materialFiles(files) : [];
+}
+
+function checkSize(what: string, bytes: number): void {
+  if (bytes <= mostBytes) return;
+  throw new FileFault(`${what} has ${short(bytes)}B; this page reads files of ${short(mostBytes)}B at most.`);
 }
 
 /** What a file had that this format cannot hold, in words. */

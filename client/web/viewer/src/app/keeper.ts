@@ -135,7 +135,7 @@ export class Keeper {
   async #show({ document, view, camera, savedAt, meshKey, steps }: Work, mesh: Mesh): Promise<void> {
     const { app } = this;
     const { selected, pinned, shape, ...look } = view;
-    this.#watchOver();
+    this.#watchOver(mesh);
     app.view.set(look);
     const { detail, isYUp, isWelded, weldTolerance } = { ...app.view.now, ...look };
     const kept = { selected, pinned, shape: shape ?? "", detail, isYUp, isWelded, weldTolerance };
@@ -148,26 +148,27 @@ export class Keeper {
   async #showAsides(store: Store, { asides = [] }: Work): Promise<void> {
     const works: Kept[] = [];
     for (const { meshKey, document, view, camera, steps } of asides) {
-      const stored = await store.mesh(meshKey);
-      if (!stored) continue;
-      const mesh = "blob" in stored ? await restored(stored) : stored;
+      const mesh = await keptMesh(store, meshKey).catch(() => undefined); // the others are not lost with it
+      if (!mesh) continue;
       works.push({ mesh, document, view, look: camera, ...(steps && { steps }) });
       this.#kept.set(mesh, meshKey);
     }
     this.app.setAside(works);
   }
 
-  /** Until the first picture, or until the page is left in the normal way. */
-  #watchOver(): void {
-    const { afterDrawing } = this.app;
+  /** Until the first picture, with its textures, or until the page is left in the normal way. */
+  #watchOver(mesh: Mesh): void {
+    const { app } = this;
+    const { afterDrawing } = app;
     const mark = restoringKey(this.#id);
     remember(mark, "yes");
     const over = () => {
       forget(mark);
-      afterDrawing.delete(over);
+      afterDrawing.delete(drawn);
       window.removeEventListener("pagehide", over);
     };
-    afterDrawing.add(over);
+    const drawn = () => app.mesh === mesh && !app.panes.some(({ isDressing }) => isDressing) && over();
+    afterDrawing.add(drawn);
     window.addEventListener("pagehide", over);
   }
 
@@ -216,6 +217,12 @@ export class Keeper {
       this.#kept.clear(); // full, or forbidden: the page asks before it is left
     }
   }
+}
+
+/** Undefined if it is not kept. Rejects if it cannot be read. */
+async function keptMesh(store: Store, meshKey: string): Promise<Mesh | undefined> {
+  const kept = await store.mesh(meshKey);
+  return kept && "blob" in kept ? restored(kept) : kept;
 }
 
 function nameOf(kept: Mesh | StoredMesh): string {

@@ -1,4 +1,4 @@
-import type { EnergyStatistics, Frame, LpdeformError, MeshReport } from "lpdeform-client";
+import type { EnergyStatistics, Frame, LpdeformError, MeshReport, Shaded } from "lpdeform-client";
 import { derivedOf, weldOf } from "lpdeform-client/mesh/derived";
 import { Live, type LiveWatcher } from "../link/live.js";
 import { say, type Status } from "../link/status.js";
@@ -12,11 +12,12 @@ import { Progress } from "../model/progress.js";
 import { pullOf } from "lpdeform-client/mesh/pull";
 import { cornersOf, type PointedOut } from "../model/pointed.js";
 import { energyStatistics } from "lpdeform-client/mesh/statistics";
+import { gathered } from "../model/texturing.js";
 import { selectionOf } from "../model/together.js";
 import type { View } from "../model/view.js";
+import { someOf } from "../model/words.js";
 import { vertexNormals } from "lpdeform-client/mesh/normals";
 import { type MeshWorker, workerOf } from "../io/opened.js";
-import type { Shaded } from "lpdeform-client";
 import { Overlay } from "../stage/overlay.js";
 import { Stage } from "../stage/stage.js";
 import { motionBetween } from "../stage/ahead.js";
@@ -64,6 +65,7 @@ export class Pane {
   #preview: Shape | undefined;
   #endsWithFrame = false;
   #dressed: Surface | undefined;
+  #dressings = 0;
 
   constructor(
     readonly side: Side,
@@ -214,23 +216,34 @@ export class Pane {
     const { name, gltf, obj, materials } = surface.mesh;
     if (this.#dressed === surface || !(gltf || (obj && materials))) return;
     this.#dressed = surface;
+    ++this.#dressings;
     try {
       const { closeAll, decoded, Textured } = await import("../stage/textured.js");
-      const texturing = gltf
+      const read = gltf
         ? (await import("../io/gltf_textures.js")).readGltfTextures(name, gltf)
         : await (await import("../io/obj_textures.js")).readObjTextures(obj!, materials!);
+      const texturing = gathered(read);
       const images = await decoded(texturing.layers);
       if (this.stage.surface !== surface) return closeAll(images);
       const unknown = new Set(texturing.layers.map(({ image }, k) => (images[k] ? undefined : image)).filter(Boolean)).size;
-      if (unknown > 0) this.watcher.notice(`${unknown} textures of ${name} are images that this browser does not show.`);
+      const few = unknown === 1 ? "One texture" : `${unknown} textures`;
+      if (unknown > 0)
+        this.watcher.notice(`${few} of ${name} cannot be shown: too large, or no image that this browser knows.`);
       const { missing = [] } = texturing;
-      if (missing.length > 0)
-        this.watcher.notice(`Open these images together with ${name} to see them: ${missing.join(", ")}.`);
+      if (missing.length > 0) this.watcher.notice(`Open these images together with ${name} to see them: ${someOf(missing)}.`);
       surface.dress((indices, makeMaterial) => new Textured({ indices }, texturing, images, makeMaterial));
       this.watcher.dressed();
     } catch (thrown) {
       this.watcher.notice(`The textures of ${name} cannot be shown: ${(thrown as Error).message}`);
+    } finally {
+      --this.#dressings;
+      this.watcher.changed();
     }
+  }
+
+  /** Whether images are being read for the surface. */
+  get isDressing(): boolean {
+    return this.#dressings > 0;
   }
 
   mark(document: Document, view: View, pointedOut: PointedOut, colour: string): void {

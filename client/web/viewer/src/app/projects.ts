@@ -9,14 +9,21 @@ export function saveProject(app: App): Promise<Uint8Array<ArrayBuffer>> {
   return writeProject({ mesh, document, view: view.now, look: app.panes[0]!.stage.look });
 }
 
-/** Opens a project in place of the present work, which is set aside. If the file has a fault, nothing changes: FileFault. */
-export async function openProject(app: App, name: string, bytes: Uint8Array<ArrayBuffer>): Promise<void> {
-  await show(app, await readProject(name, bytes));
+/**
+ * Opens a project in place of the present work, which is set aside. If the file has a fault, nothing changes: FileFault. False, and
+ * nothing changes, if something else is opened in the meantime.
+ */
+export async function openProject(app: App, file: File): Promise<boolean> {
+  const isNewest = app.opening();
+  const project = await readProject(file.name, new Uint8Array(await file.arrayBuffer()));
+  await prepare(project.mesh, weldingOf(project.view)); // what follows happens at once
+  if (!isNewest()) return false;
+  await show(app, project);
+  return true;
 }
 
 async function show(app: App, { mesh, document, view, look }: Project): Promise<void> {
   const { shape, detail, selected, isYUp, pinned, isWelded, weldTolerance, ...settings } = view;
-  await prepare(mesh, weldingOf(view)); // what follows happens at once
   app.endAll();
   app.view.set({ ...settings, isYUp }); // before the camera is set, because that depends on what is up
   await app.restore({ mesh, document, look, view: { shape, detail, selected, isYUp, pinned, isWelded, weldTolerance } });

@@ -11,6 +11,9 @@ interface Material {
   isRepeated: boolean;
 }
 
+/** How many lines are read before the page may do something else. */
+const linesAtOnce = 10_000;
+
 const white: Material = { colour: [1, 1, 1], image: undefined, isRepeated: true };
 
 /**
@@ -18,38 +21,34 @@ const white: Material = { colour: [1, 1, 1], image: undefined, isRepeated: true 
  * named and were not opened with it are listed as missing. Rejects if the browser no longer has a file.
  */
 export async function readObjTextures(obj: Uint8Array, files: MaterialFiles): Promise<Texturing> {
-  const texts = Object.keys(files).filter((name) => /\.mtl$/i.test(name));
-  const materials = new Map<string, Material>();
-  for (const name of texts) readMaterials(await files[name]!.text(), materials);
   const coordinates: number[] = [];
   const corners: number[] = [];
-  const layers: (TextureLayer & { firstFace: number; faceCount: number })[] = [];
-  const missing = new Set<string>();
+  const libraries: string[] = [];
+  const runs: { material: string; firstFace: number; faceCount: number }[] = [];
   let present = "";
-  let last: string | undefined;
+  let lineCount = 0;
   for (const { words } of logicalLines(new TextDecoder().decode(obj))) {
+    if (++lineCount % linesAtOnce === 0) await new Promise((go) => setTimeout(go)); // the page answers in between
     const [key, ...values] = words;
+    if (key === "mtllib") for (const name of [values.join(" "), ...values]) libraries.push(name);
     if (key === "vt") coordinates.push(Number(values[0] ?? 0), 1 - Number(values[1] ?? 0));
     if (key === "usemtl") present = values.join(" ");
     if (key !== "f") continue;
     const places = values.map((word) => placeOf(word.split("/")[1], coordinates.length / 2));
     for (let k = 2; k < places.length; ++k) corners.push(places[0]!, places[k - 1]!, places[k]!);
-    if (present !== last) {
-      const material = materials.get(present) ?? white;
-      const image = material.image === undefined ? undefined : fileOf(files, material.image);
-      if (material.image !== undefined && !image) missing.add(material.image);
-      const { colour, isRepeated } = material;
-      layers.push({
-        firstFace: corners.length / 3 - (places.length - 2),
-        faceCount: 0,
-        colour,
-        isRepeated,
-        ...(image && { image }),
-      });
-      last = present;
-    }
-    layers.at(-1)!.faceCount += places.length - 2;
+    const faceCount = places.length - 2;
+    if (runs.at(-1)?.material === present) runs.at(-1)!.faceCount += faceCount;
+    else runs.push({ material: present, firstFace: corners.length / 3 - faceCount, faceCount });
   }
+  const byName = new Map(Object.entries(files).map(([name, file]) => [name.toLowerCase(), file]));
+  const materials = await materialsOf(byName, libraries);
+  const missing = new Set<string>();
+  const layers = runs.map(({ material, firstFace, faceCount }): TextureLayer => {
+    const { image: path, colour, isRepeated } = materials.get(material) ?? white;
+    const image = path === undefined ? undefined : byName.get(baseOf(path));
+    if (path !== undefined && !image) missing.add(path);
+    return { firstFace, faceCount, colour, isRepeated, ...(image && { image }) };
+  });
   // Corners without a place are at the first one, or where there is none at 0.
   const count = coordinates.length / 2;
   const known = (place: number) => (place >= 0 && place < count ? place : 0);
@@ -59,6 +58,30 @@ export async function readObjTextures(obj: Uint8Array, files: MaterialFiles): Pr
     layers,
     missing: [...missing],
   };
+}
+
+/** Of the MTL files that the OBJ names, the first of them first, or of all if none of those is there. */
+async function materialsOf(
+  byName: ReadonlyMap<string, Blob>,
+  libraries: readonly string[],
+): Promise<ReadonlyMap<string, Material>> {
+  const named = [...new Set(libraries.map(baseOf))].filter((name) => byName.has(name));
+  const read = named.length > 0 ? named.reverse() : [...byName.keys()].filter((name) => name.endsWith(".mtl"));
+  const materials = new Map<string, Material>();
+  for (const name of read) readMaterials(await byName.get(name)!.text(), materials);
+  return materials;
+}
+
+/** Of the files that were chosen with an OBJ: the MTL files, and the images that they name. */
+export async function materialFiles(chosen: readonly File[]): Promise<File[]> {
+  const named = new Set<string>();
+  const isText = ({ name }: File) => /\.mtl$/i.test(name);
+  for (const file of chosen.filter(isText)) {
+    const materials = new Map<string, Material>();
+    readMaterials(await file.text(), materials);
+    for (const { image } of materials.values()) if (image !== undefined) named.add(baseOf(image));
+  }
+  return chosen.filter((file) => isText(file) || named.has(file.name.toLowerCase()));
 }
 
 function placeOf(word: string | undefined, count: number): number {
@@ -116,11 +139,9 @@ function mapOf(values: readonly string[]): { file: string; isClamped: boolean } 
   return { file: values.slice(at).join(" "), isClamped };
 }
 
-/** Whatever folders an MTL names: files are opened without them. */
-function fileOf(files: MaterialFiles, path: string): Blob | undefined {
-  const wanted = path.split(/[\\/]/).at(-1)!.toLowerCase();
-  const name = Object.keys(files).find((one) => one.toLowerCase() === wanted);
-  return name === undefined ? undefined : files[name];
+/** A file's name in small letters. Whatever folders a file names: files are opened without them. */
+function baseOf(path: string): string {
+  return path.split(/[\\/]/).at(-1)!.toLowerCase();
 }
 
 /** From sRGB. */

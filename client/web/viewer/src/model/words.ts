@@ -27,6 +27,14 @@ export function lowerText(saved: number | undefined): string {
   return saved === undefined ? "may exist" : `known, ${percent(saved)} less energy`;
 }
 
+/** The first five of the names, each cut to a length that a line can hold, and how many more there are. */
+export function someOf(names: readonly string[]): string {
+  const [few, longest] = [5, 80];
+  const shown = names.slice(0, few).map((name) => (name.length > longest ? `${name.slice(0, longest)}…` : name));
+  const more = names.length > few ? ` and ${(names.length - few).toLocaleString("en")} more` : "";
+  return `${shown.join(", ")}${more}`;
+}
+
 export function capital(text: string): string {
   return text.slice(0, 1).toUpperCase() + text.slice(1);
 }

@@ -1,7 +1,7 @@
 import * as three from "three";
 import type { Adjacency } from "lpdeform-client/mesh/adjacency";
 import { type Derived, derivedOf } from "lpdeform-client/mesh/derived";
-import type { DrawnAt } from "lpdeform-client";
+import type { DrawnAt, Shaded } from "lpdeform-client";
 import { drawInto, drawnAt, spread } from "lpdeform-client/mesh/drawmesh";
 import type { Drawn } from "lpdeform-client/mesh/drawn";
 import { blockBoxes, type FaceBlocks } from "lpdeform-client/mesh/face_blocks";
@@ -9,7 +9,6 @@ import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { Pairs } from "lpdeform-client/mesh/pairs";
 import { type Hit, raycast } from "../model/raycast.js";
 import type { ColourBy, View } from "../model/view.js";
-import type { Shaded } from "lpdeform-client";
 import { isSoftware } from "./software.js";
 import { colourByPixel, paint, surfaceMaterial } from "./surface_material.js";
 import type { Textured } from "./textured.js";

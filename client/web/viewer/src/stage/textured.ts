@@ -1,13 +1,8 @@
 import * as three from "three";
 import { Pairs } from "lpdeform-client/mesh/pairs";
+import type { DrawnAt } from "lpdeform-client";
+import type { Drawn } from "lpdeform-client/mesh/drawn";
 import type { Texturing, TextureLayer } from "../model/texturing.js";
-
-/** What is drawn of a surface, as DrawMesh has it. */
-interface Drawn {
-  indices: Uint32Array;
-  positions: Float32Array;
-  normals: Float32Array;
-}
 
 /** A surface with images on it. Its vertices are those that are drawn otherwise, split where an image ends or begins again. */
 export class Textured {
@@ -21,7 +16,7 @@ export class Textured {
   /** `images`: those of the layers, which the object closes in the end. `makeMaterial`: the surface's, for one layer. */
   constructor(
     { indices }: Pick<Drawn, "indices">,
-    { coordinates, corners, layers }: Texturing,
+    { coordinates, corners, layers, order }: Texturing,
     images: readonly (ImageBitmap | undefined)[],
     makeMaterial: () => three.ShaderMaterial,
   ) {
@@ -37,7 +32,8 @@ export class Textured {
       return source.push(drawn) - 1;
     });
     this.#source = Uint32Array.from(source);
-    this.#geometry.setIndex(new three.BufferAttribute(own, 1));
+    const ordered = order ? own.map((_, corner) => own[3 * order[Math.floor(corner / 3)]! + (corner % 3)]!) : own;
+    this.#geometry.setIndex(new three.BufferAttribute(ordered, 1));
     for (const name of ["position", "normal", "pull"] as const) {
       const width = name === "pull" ? 1 : 3;
       const array = new Float32Array(width * source.length);
@@ -65,7 +61,7 @@ export class Textured {
     return texture;
   }
 
-  move({ positions, normals }: Pick<Drawn, "positions" | "normals">): void {
+  move({ positions, normals }: Pick<DrawnAt, "positions" | "normals">): void {
     this.#take("position", positions, 3);
     this.#take("normal", normals, 3);
   }
@@ -105,15 +101,56 @@ function layerMaterial(
   return material;
 }
 
-/** Each image once. Undefined for those that cannot be shown. */
-export function decoded(layers: readonly TextureLayer[]): Promise<(ImageBitmap | undefined)[]> {
-  const known = new Map<Blob, Promise<ImageBitmap | undefined>>();
-  const decode = (image: Blob) => {
-    const bitmap = createImageBitmap(image, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
-    return bitmap.catch(() => undefined);
-  };
-  for (const { image } of layers) if (image && !known.has(image)) known.set(image, decode(image));
-  return Promise.all(layers.map(({ image }) => image && known.get(image)));
+/** An image with more pixels is not shown: while it is decoded, it takes four bytes for each. */
+const mostPixels = 2 ** 27;
+
+/**
+ * Each image once, one after the other. If all together have more than 2^27 pixels, they are made smaller. Undefined for those that
+ * the browser cannot show, and for those with more than 2^27 pixels.
+ */
+export async function decoded(layers: readonly TextureLayer[]): Promise<(ImageBitmap | undefined)[]> {
+  const sizes = new Map<Blob, Size>();
+  for (const image of new Set(layers.map((layer) => layer.image))) {
+    const size = image && (await sizeOf(image));
+    if (size && size.width * size.height <= mostPixels) sizes.set(image, size);
+  }
+  const pixels = [...sizes.values()].reduce((sum, { width, height }) => sum + width * height, 0);
+  const share = Math.min(1, Math.sqrt(mostPixels / pixels));
+  const images = new Map<Blob, ImageBitmap | undefined>();
+  for (const [image, size] of sizes) images.set(image, await bitmapOf(image, size, share).catch(() => undefined));
+  return layers.map(({ image }) => image && images.get(image));
+}
+
+interface Size {
+  width: number;
+  height: number;
+}
+
+/** Found without decoding the image. Undefined if the browser cannot show it. */
+async function sizeOf(blob: Blob): Promise<Size | undefined> {
+  const image = new Image();
+  const address = URL.createObjectURL(blob);
+  try {
+    await new Promise((done, failed) => {
+      image.onload = done;
+      image.onerror = failed;
+      image.src = address;
+    });
+    return { width: image.naturalWidth, height: image.naturalHeight };
+  } catch {
+    return undefined;
+  } finally {
+    URL.revokeObjectURL(address);
+  }
+}
+
+function bitmapOf(image: Blob, { width, height }: Size, share: number): Promise<ImageBitmap> {
+  const smaller = (length: number) => Math.max(1, Math.floor(share * length));
+  return createImageBitmap(image, {
+    colorSpaceConversion: "none",
+    premultiplyAlpha: "none",
+    ...(share < 1 && { resizeWidth: smaller(width), resizeHeight: smaller(height) }),
+  });
 }
 
 export function closeAll(images: readonly (ImageBitmap | undefined)[]): void {

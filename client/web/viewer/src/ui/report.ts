@@ -39,7 +39,7 @@ export function reportPanel(app: App): HTMLElement {
   const weld = toggle(
     "Weld seams",
     true,
-    (isOn) => void app.weld({ tolerance: app.view.now.weldTolerance, isOn }),
+    (isOn) => void app.weld({ tolerance: app.view.now.weldTolerance, isOn }).then(showSeams),
     "Vertices in one place move as one; saved files have them all",
   );
   const reach = el("select", { aria: { label: "How far apart welded vertices may be" } });

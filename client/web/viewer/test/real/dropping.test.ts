@@ -153,3 +153,24 @@ it("an OBJ file keeps what it has beside where it is saved as such, and it is sa
     "texture coordinates, groups, materials, faces of more than three corners. Saved as OBJ, they stay.",
   );
 });
+
+it("of two files the one that was opened last stays, however long the first one takes", async () => {
+  const size = 300;
+  const vertices = Array.from({ length: size * size }, (_, k) => `v ${k % size} ${Math.floor(k / size)} 0`);
+  const faces = Array.from({ length: size * size - size }, (_, k) => k + 1).filter((k) => k % size !== 0);
+  const long = `${vertices.join("\n")}\n${faces.map((k) => `f ${k} ${k + 1} ${k + size}`).join("\n")}\n`;
+  await user.page.evaluate(`window.opened = [];
+    window.__lpdeform.app.facts.watch(({ mesh }) => [mesh], ([{ name }]) => window.opened.push(name))`);
+  const inPage = `(name, text) => {
+    const event = new DragEvent("drop", { dataTransfer: new DataTransfer(), bubbles: true });
+    event.dataTransfer.items.add(new File([text], name));
+    document.body.dispatchEvent(event);
+  }`;
+  await user.page.evaluate(
+    `(${inPage})("long.obj", ${JSON.stringify(long)}); (${inPage})("short.off", ${JSON.stringify(writeOff(mesh))})`,
+  );
+  await isOpen("short.off");
+  await user.page.waitForTimeout(4000);
+  expect(await user.ask("app.mesh.name")).toBe("short.off");
+  expect(await user.page.evaluate("window.opened")).not.toContain("long.obj");
+});

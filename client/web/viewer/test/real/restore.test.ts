@@ -248,6 +248,34 @@ it("each work that is followed by another stays, however many there are, over a 
   expect(keys).toBe(2); // what was dismissed takes no room
 });
 
+it("work that was set aside and cannot be read any more takes nothing else with it", async () => {
+  await bend();
+  const tower = writeOff(blockSurface(2, 2, 6, () => true));
+  for (const name of ["second.off", "third.off"]) {
+    await user.openFiles({ name, content: tower });
+    await user.until(`window.__lpdeform.app.mesh.name === '${name}' && window.__lpdeform.app.facts.now.report`);
+    const { x, y } = await user.vertexOnPage(await user.vertexNear([1, 0, 5]));
+    await user.page.mouse.click(x, y);
+  }
+  const last = await work();
+  await user.page.waitForTimeout(700);
+  await user.page.evaluate(`new Promise((resolve) => {
+    indexedDB.open("lpdeform").onsuccess = ({ target: { result } }) => {
+      const transaction = result.transaction(["works", "meshes"], "readwrite");
+      transaction.oncomplete = resolve;
+      transaction.objectStore("works").get(sessionStorage.getItem("lpdeform-work")).onsuccess = ({ target }) => {
+        const [{ meshKey }] = target.result.asides;
+        const arrays = [{ key: "positions", kind: "Float32Array", length: 3 }];
+        transaction.objectStore("meshes").put({ arrays, blob: new Blob(["gone"]), rest: { name: "second.off" } }, meshKey);
+      };
+    };
+  })`);
+  await user.page.reload();
+  await user.until("window.__lpdeform?.status() === 'live'");
+  expect([await user.ask("app.mesh.name"), await work()]).toEqual(["third.off", last]);
+  expect(await user.ask("app.facts.now.setAside.map(({ name }) => name)")).toEqual(["bar"]);
+});
+
 it("work at which the page stopped is shown again only where that is wanted", async () => {
   await bend();
   const bent = await work();

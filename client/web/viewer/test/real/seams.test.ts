@@ -148,6 +148,17 @@ it("within a larger distance vertices inside of surfaces count, too, and are pai
   expect(user.errors).toEqual([]);
 });
 
+it("of two wishes for the welding the last one counts", async () => {
+  const apart = { ...tube, positions: tube.positions.slice() };
+  for (let row = 0; row <= rows; ++row) apart.positions[3 * (row * (columns + 1) + columns)]! += 0.005;
+  await user.openFiles({ name: "twice.off", content: writeOff(apart) });
+  await user.until("window.__lpdeform.app.mesh.name === 'twice.off'");
+  const wishes = [1e-3, 1e-6].map((tolerance) => `window.__lpdeform.app.weld({ tolerance: ${tolerance}, isOn: true })`);
+  await user.page.evaluate(`Promise.all([${wishes.join(", ")}])`);
+  expect(await user.ask("app.view.now.weldTolerance")).toBe(1e-6);
+  expect(await user.ask("app.seams?.copyCount ?? 0")).toBe(0);
+});
+
 it("a mesh without seams has no switch", async () => {
   await user.page.getByLabel("Shape").selectOption("bar");
   await user.settled();

@@ -118,5 +118,27 @@ it("the images of an OBJ are shown if they are opened with it and its MTL, also 
   await user.until(`window.__lpdeform?.app.mesh.name === "sheet.obj"`);
   expect(await user.ask("app.view.now.colourBy")).toBe("texture");
   await shown();
+
+  const mark = () =>
+    user.page.evaluate("localStorage.getItem('lpdeform-restoring-' + sessionStorage.getItem('lpdeform-work'))");
+  expect(await mark()).toBe(null);
+  // A page that stops over its textures asks the next time.
+  await user.page.addInitScript("createImageBitmap = () => ((window.isDecoding = true), new Promise(() => undefined))");
+  await user.page.reload();
+  await user.until("window.isDecoding && window.__lpdeform?.app.panes[0].frame");
+  await user.page.waitForTimeout(500);
+  expect(await mark()).toBe("yes");
   expect(user.errors).toEqual([]);
+});
+
+it("an image of a few bytes that would take gigabytes is not decoded, and it is said", async () => {
+  const content = "mtllib huge.mtl\nv 0 0 0\nv 1 0 0\nv 0 0 1\nvt 0 0\nusemtl huge\nf 1/1 2/1 3/1\n";
+  await user.openFiles(
+    { name: "huge.obj", content },
+    { name: "huge.mtl", content: "newmtl huge\nmap_Kd huge.png\n" },
+    { name: "huge.png", content: Buffer.from(pngOf(30_000, 30_000, [255, 0, 0])) },
+  );
+  await user.until(`window.__lpdeform.app.mesh.name === "huge.obj"`);
+  await user.ask("app.view.set({ colourBy: 'texture' })");
+  await user.page.locator(".notice", { hasText: "One texture of huge.obj cannot be shown: too large" }).waitFor();
 });
