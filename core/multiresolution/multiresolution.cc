@@ -13,8 +13,7 @@ constexpr double kRoughCoarseTolerance = 1e-3;  // if some p_i < 2 and the first
 constexpr double kFirstTolerance = 1e-2;        // before its cells bend like the fine ones
 constexpr double kEasedTolerance = 3e-3;        // after that
 constexpr double kGentleTolerance = 1e-2;       // if its cells bend like the fine ones from the beginning
-constexpr double kLowestTolerance =
-    1e-4;  // on the lowest level of those, after its cells bend like the fine ones
+constexpr double kLowestTolerance = 1e-4;       // on the lowest level of those, once they do
 
 /// Handles have moved little if no cell of the guess is strained more than this. Sheets that are bent by 0.036 have been seen to end
 /// in worse minima when all levels bend like the finest.

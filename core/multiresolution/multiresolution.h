@@ -13,10 +13,12 @@ namespace lpdeform {
 /// Solves the coarse level first, by any method that suits it (which may include a level below it), then runs
 /// QuasiNewton from the prolonged result. On large meshes the coarse level is solved as it is, which finds the better
 /// minima, and goes on with cells that bend like those of the fine level (CoarseLevel::bend_like_fine), which saves fine
-/// iterations. If the handles have moved little, which as a rule
-/// leaves one minimum to find, all levels have such cells from the beginning; only the lowest is first solved with the bending
-/// of the level above it. The long way along a curved valley is then travelled where an iteration costs least. One iteration of the coarse level counts as one iteration here. Until the coarse level has ended, the state
-/// is the initial guess. If the prolonged result is not better than the initial guess, QuasiNewton starts from the guess.
+/// iterations. If the handles have moved little, there is as a rule one minimum to find. All levels then have such cells from
+/// the beginning; only the lowest is first solved with the bending of the level above it. The long way along a curved valley
+/// is travelled where an iteration costs least.
+///
+/// One iteration of the coarse level counts as one iteration here. Until the coarse level has ended, the state is the
+/// initial guess. If the prolonged result is not better than the initial guess, QuasiNewton starts from the guess.
 /// The convergence criterion is that of QuasiNewton.
 class Multiresolution : public Minimiser {
  public:

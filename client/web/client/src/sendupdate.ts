@@ -17,7 +17,7 @@ export async function sendUpdate(
   const uploads = new Uploads(rpc, signal);
   const message = updateToWire(update.update, update.seq, packer);
   try {
-    if (packer.isLarge) await new Promise<void>(inTaskOfItsOwn); // not in the task of whoever makes the change
+    if (packer.isLarge) await new Promise<void>(inTaskOfItsOwn); // the caller's task ends first
     await packer.flush((bytes) => uploads.add(bytes));
     const { result } = await rpc.call("updateHandles", { session, writerToken, update: message }, signal);
     return result?.kept ?? false;

@@ -1,6 +1,5 @@
-// What somebody who works in the viewer waits for: npm run figures. How soon the page says that the server is away, frames of a drag
-// of 10,000, 40,000 and 100,000 vertices, and how long a shape takes to settle. SECONDS (default 8) of each drag. Measures, does not
-// judge.
+// The program of npm run figures. It measures how soon the page says that the server is away, the frames of a drag of 10,000, 40,000
+// and 100,000 vertices, and how long a shape takes to settle. SECONDS is the length of each drag (default 8). No figure makes it fail.
 import { mkdtempSync, rmSync } from "node:fs";
 import { loadavg, tmpdir } from "node:os";
 import { join } from "node:path";

@@ -25,6 +25,20 @@ const withoutWorkers = () => {
   } as unknown as typeof Worker;
 };
 
+/** Opens the ring and puts handles at 0.62 and 0.88 of the turn around it. Returns where a vertex of it is on the page. */
+async function openRing(user: User) {
+  await user.settled();
+  await user.openFiles({ name: "ring.obj", content: ringObj(around, across) });
+  await user.until(`window.__lpdeform.app.mesh.name === "ring.obj"`);
+  const onRing = (turn: number) => user.vertexOnPage(ringVertex(around, across, turn, 0.2));
+  for (const turn of [0.62, 0.88]) {
+    const { x, y } = await onRing(turn);
+    await user.page.mouse.click(x, y);
+  }
+  await user.settled();
+  return onRing;
+}
+
 /** So that a test can end them. */
 const withKeptWorkers = () => {
   const kept: Worker[] = [];
@@ -41,15 +55,7 @@ const withKeptWorkers = () => {
 it("goes on when the mesh's worker ends", async () => {
   const user = await User.open(`${service.url}/?shape=sheet&detail=coarse`);
   await user.page.evaluate(withKeptWorkers);
-  await user.settled();
-  await user.openFiles({ name: "ring.obj", content: ringObj(around, across) });
-  await user.until(`window.__lpdeform.app.mesh.name === "ring.obj"`);
-  const onRing = (turn: number) => user.vertexOnPage(ringVertex(around, across, turn, 0.2));
-  for (const turn of [0.62, 0.88]) {
-    const { x, y } = await onRing(turn);
-    await user.page.mouse.click(x, y);
-  }
-  await user.settled();
+  const onRing = await openRing(user);
   await user.page.evaluate("window.kept.forEach((one) => { one.terminate(); one.dispatchEvent(new Event('error')); })");
   await expect.poll(() => user.page.workers().length).toBe(0);
   const [from, far] = await Promise.all([onRing(0.88), onRing(0.8)]);
@@ -66,15 +72,7 @@ it("goes on when the mesh's worker ends", async () => {
 it.each([true, false])("follows a handle between frames; with workers: %s", async (hasWorkers) => {
   const user = await User.open(`${service.url}/?shape=sheet&detail=coarse`);
   if (!hasWorkers) await user.page.evaluate(withoutWorkers);
-  await user.settled();
-  await user.openFiles({ name: "ring.obj", content: ringObj(around, across) });
-  await user.until(`window.__lpdeform.app.mesh.name === "ring.obj"`);
-  const onRing = (turn: number) => user.vertexOnPage(ringVertex(around, across, turn, 0.2));
-  for (const turn of [0.62, 0.88]) {
-    const { x, y } = await onRing(turn);
-    await user.page.mouse.click(x, y);
-  }
-  await user.settled();
+  const onRing = await openRing(user);
   const workers = user.page.workers().map((worker) => /\/(\w+)_worker/.exec(worker.url())![1]);
   expect(workers.sort()).toEqual(hasWorkers ? ["mesh"] : []); // it has read the file, too
   const [from, far] = await Promise.all([onRing(0.88), onRing(0.4)]);

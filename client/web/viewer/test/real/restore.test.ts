@@ -42,6 +42,13 @@ async function bend(): Promise<void> {
   await user.settled();
 }
 
+async function openTower(name: string): Promise<void> {
+  await user.openFiles({ name, content: writeOff(blockSurface(2, 2, 6, () => true)) });
+  await user.until(`window.__lpdeform.app.mesh.name === '${name}' && window.__lpdeform.app.facts.now.report`);
+  const { x, y } = await user.vertexOnPage(await user.vertexNear([1, 0, 5]));
+  await user.page.mouse.click(x, y);
+}
+
 const far = (a: readonly number[], b: readonly number[]) => Math.max(...a.map((value, k) => Math.abs(value - b[k]!)));
 
 it("a reload brings handles, groups, p, painting, both panes and the view back, and says so", async () => {
@@ -201,12 +208,8 @@ it("work that was set aside stays, however much is opened after it and left as i
 it("each work that is followed by another stays, however many there are, over a reload too", async () => {
   await bend();
   const works = [await work()];
-  const tower = writeOff(blockSurface(2, 2, 6, () => true));
   for (const name of ["second.off", "third.off"]) {
-    await user.openFiles({ name, content: tower });
-    await user.until(`window.__lpdeform.app.mesh.name === '${name}' && window.__lpdeform.app.facts.now.report`);
-    const { x, y } = await user.vertexOnPage(await user.vertexNear([1, 0, 5]));
-    await user.page.mouse.click(x, y);
+    await openTower(name);
     works.push(await work());
   }
   const aside = user.page.locator(".aside");
@@ -250,13 +253,7 @@ it("each work that is followed by another stays, however many there are, over a 
 
 it("work that was set aside and cannot be read any more takes nothing else with it", async () => {
   await bend();
-  const tower = writeOff(blockSurface(2, 2, 6, () => true));
-  for (const name of ["second.off", "third.off"]) {
-    await user.openFiles({ name, content: tower });
-    await user.until(`window.__lpdeform.app.mesh.name === '${name}' && window.__lpdeform.app.facts.now.report`);
-    const { x, y } = await user.vertexOnPage(await user.vertexNear([1, 0, 5]));
-    await user.page.mouse.click(x, y);
-  }
+  for (const name of ["second.off", "third.off"]) await openTower(name);
   const last = await work();
   await user.page.waitForTimeout(700);
   await user.page.evaluate(`new Promise((resolve) => {
