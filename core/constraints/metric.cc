@@ -8,7 +8,6 @@
 namespace lpdeform {
 namespace {
 
-constexpr std::size_t kChunk = 4096;  // vertices
 constexpr int kPasses = 12;
 constexpr double kRefined = 1e-12;  // refinement ends when the correction's share of the result is <= this
 constexpr std::size_t kBytesPerEntry = 40;  // per matrix entry: the value and its places in the factor

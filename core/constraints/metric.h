@@ -76,6 +76,20 @@ class Metric {
   void extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
               const Points* forces = nullptr) const;
 
+  /// Adds to `forces`, as extend() takes them, those of edges that want to be longer or to turn: sum over j of W_ij wanted(i, j) at
+  /// vertex i. W_ij = 2 (c_i + c_j) w_ij, and wanted(j, i) = -wanted(i, j). The same bits on any number of threads.
+  template <typename Wanted>
+  void add_edge_forces(const Wanted& wanted, const Workers& workers, Points& forces) const {
+    workers.for_chunks(static_cast<std::size_t>(forces.rows()), kChunk,
+                       [&](std::size_t, std::size_t begin, std::size_t end) {
+                         for (auto i = static_cast<std::int32_t>(begin); i < static_cast<std::int32_t>(end);
+                              ++i) {
+                           for (std::int32_t k = shape_->offsets()[i]; k < shape_->offsets()[i + 1]; ++k)
+                             forces.row(i) += scale_ * edge_weight(i, k) * wanted(i, shape_->neighbours()[k]);
+                         }
+                       });
+  }
+
   /// c_i as factored, clipped.
   double cell_weight(std::int32_t i) const { return scale_ * cell_weights_[i]; }
 
@@ -90,6 +104,8 @@ class Metric {
   std::size_t memory_bytes() const;
 
  private:
+  static constexpr std::size_t kChunk = 4096;  // vertices
+
   Metric(std::shared_ptr<const RestShape> shape, LowerMatrix matrix, const SupernodePattern& supernodes);
   double edge_weight(std::int32_t i, std::int32_t k) const {
     return 2 * (cell_weights_[i] + cell_weights_[shape_->neighbours()[k]]) * shape_->weights()[k];

@@ -12,6 +12,11 @@ namespace {
 
 constexpr std::size_t kChunk = 4096;  // vertices
 
+/// A level that leads makes kLeadingWork / vertices iterations for a move, within these bounds.
+constexpr std::int32_t kLeadingWork = 70000;
+constexpr std::int32_t kLeastLeading = 4, kMostLeading = 100;
+constexpr double kLeadingTolerance = 1e-3;
+
 /// The field at the coarse vertices; a single value stays a single value.
 Field restricted(const Field& field, const std::vector<std::int32_t>& fine_vertex) {
   if (field.size() == 1) return field;
@@ -32,7 +37,7 @@ CoarseMesh CoarseLevel::coarsened(const RestShape& fine) {
 }
 
 std::unique_ptr<CoarseLevel> CoarseLevel::create(const RestShape& fine, CoarseMesh coarse,
-                                                 MakeLevelSolver make_solver) {
+                                                 const MakeLevelSolver& make_solver) {
   if (2 * coarse.mesh.vertices.rows() > fine.vertex_count() || coarse.mesh.faces.rows() == 0) return nullptr;
   auto shape = RestShape::create(coarse.mesh, fine.weight_kind());
   if (!shape.ok()) return nullptr;
@@ -44,7 +49,6 @@ std::unique_ptr<CoarseLevel> CoarseLevel::create(const RestShape& fine, CoarseMe
   level->share_.assign(level->fine_vertex_.size(), 0.0);
   for (const std::int32_t c : level->coarse_vertex_) level->share_[c] += 1;
   level->shape_ = *std::move(shape);
-  level->make_solver_ = std::move(make_solver);
   level->solver_ = std::move(solver);
   level->find_guides(fine);
   return level;
@@ -84,14 +88,11 @@ void CoarseLevel::find_guides(const RestShape& fine) {
   }
 }
 
-absl::Status CoarseLevel::take_over(const RestShape& fine, const HandleSet& handles,
-                                    const Constraints& constraints, const Material& material,
-                                    double bending) {
-  if (!solver_) solver_ = make_solver_(shape_);
-  if (!solver_) return absl::InternalError("The solver of a coarse level could not be made again.");
+absl::Status CoarseLevel::restrict_inputs(const FineInputs& fine) {
   const std::size_t n = fine_vertex_.size();
+  const Material& material = fine.material;
   Material coarse{restricted(material.p, fine_vertex_), restricted(material.stiffness, fine_vertex_),
-                  material.length_unit > 0 ? material.length_unit : fine.mean_edge_length()};
+                  material.length_unit > 0 ? material.length_unit : fine.shape.mean_edge_length()};
   if (material.p.size() > 1 || material.p[0] != 2) {
     Field stiffness(static_cast<Eigen::Index>(n));
     for (std::size_t c = 0; c < n; ++c) {
@@ -102,43 +103,106 @@ absl::Status CoarseLevel::take_over(const RestShape& fine, const HandleSet& hand
     }
     coarse.stiffness = std::move(stiffness);
   }
-  bending_ = bending;
-  solver_->set_bending(bending);
+  bending_ = fine.bending;
   absl::Status status = solver_->set_material(coarse);
   status.Update(solver_->set_handles(
-      coarse_handles({fine, *shape_, fine_vertex_, coarse_vertex_}, handles, constraints)));
+      coarse_handles({fine.shape, *shape_, fine_vertex_, coarse_vertex_}, fine.handles, fine.constraints)));
   return status;
 }
 
-Points CoarseLevel::prolong(const RestShape& fine, const Workers& workers) const {
+absl::Status CoarseLevel::take_over(const FineInputs& fine) {
+  solver_->set_bending(fine.bending);
+  return restrict_inputs(fine);
+}
+
+bool CoarseLevel::can_lead(const RestShape& fine, double bending) {
+  return fine.vertex_count() >= (bending < 1 ? kLeastEasedLevel : kLeastEased) &&
+         fine.weight_kind() != WeightKind::kUniform;
+}
+
+std::optional<CoarseMotion> CoarseLevel::lead(const FineInputs& fine, const Points* from,
+                                              const Workers& workers, std::stop_token stop) {
+  const Pose before = from ? pose(fine.shape, workers) : rest_pose(fine.shape);
+  if (!restrict_inputs(fine).ok()) return std::nullopt;
+  bend_like_fine();
+  SolveSettings settings;
+  settings.initial = InitialGuess::kCurrent;
+  settings.method = Method::kQuasiNewton;
+  settings.tolerance = kLeadingTolerance;
+  settings.effort = 0;
+  settings.keep_trace = false;
+  settings.max_iterations = std::clamp(kLeadingWork / shape_->vertex_count(), kLeastLeading, kMostLeading);
+  if (!solver_->start(settings, std::move(stop)).ok()) return std::nullopt;
+  while (solver_->step()) {
+  }
+  CoarseMotion motion;
+  motion.positions = carried(from ? *from : fine.shape.scaled_positions(), before, pose(fine.shape, workers),
+                             workers, &motion.turns);
+  return motion;
+}
+
+absl::Status CoarseLevel::go_to(const FineInputs& fine, const Points& x) {
+  absl::Status status = restrict_inputs(fine);
+  bend_like_fine();
+  Points positions(static_cast<Eigen::Index>(fine_vertex_.size()), 3);
+  for (std::size_t c = 0; c < fine_vertex_.size(); ++c) {
+    positions.row(static_cast<Eigen::Index>(c)) =
+        x.row(fine_vertex_[c]) * fine.shape.mean_edge_length() + fine.shape.centre();
+  }
+  status.Update(solver_->set_positions(positions));
+  return status;
+}
+
+CoarseLevel::Pose CoarseLevel::rest_pose(const RestShape& fine) const {
+  Pose rest{Points(static_cast<Eigen::Index>(fine_vertex_.size()), 3),
+            std::vector<Eigen::Matrix3d>(fine_vertex_.size(), Eigen::Matrix3d::Identity())};
+  for (std::size_t c = 0; c < fine_vertex_.size(); ++c)
+    rest.positions.row(static_cast<Eigen::Index>(c)) = fine.scaled_positions().row(fine_vertex_[c]);
+  return rest;
+}
+
+CoarseLevel::Pose CoarseLevel::pose(const RestShape& fine, const Workers& workers) const {
   const Points coarse = (solver_->positions().rowwise() - shape_->centre()) / shape_->mean_edge_length();
   CellPass cells(shape_, workers);
   cells.evaluate(coarse, LpNorm(Material::uniform(2), shape_->vertex_count(), 1, 1));
-  const std::vector<Eigen::Matrix3d> rotations = cells.rotations();
+  return {(solver_->positions().rowwise() - fine.centre()) / fine.mean_edge_length(), cells.rotations()};
+}
 
-  const double unit = fine.mean_edge_length();
-  const Points moved = (solver_->positions().rowwise() - fine.centre()) / unit;
-  Points result(fine.vertex_count(), 3);
-  const auto place = [&](Eigen::Index v) {
-    const Eigen::RowVector3d rest = fine.scaled_positions().row(v);
+/// The fine surface `from`, moved as its guides have moved from one coarse state to another. With `turns`, writes them too.
+Points CoarseLevel::carried(const Points& from, const Pose& before, const Pose& now, const Workers& workers,
+                            std::vector<Eigen::Matrix3d>* turns) const {
+  std::vector<Eigen::Matrix3d> coarse_turns(fine_vertex_.size());
+  for (std::size_t c = 0; c < coarse_turns.size(); ++c)
+    coarse_turns[c] = before.rotations[c] * now.rotations[c].transpose();
+  Points result(from.rows(), 3);
+  if (turns) turns->resize(static_cast<std::size_t>(from.rows()));
+  const auto place = [&](std::size_t v) {
+    const auto row = static_cast<Eigen::Index>(v);
     Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
-    const Guides& guides = guides_[static_cast<std::size_t>(v)];
+    Eigen::Matrix3d turn = Eigen::Matrix3d::Zero();
+    const Guides& guides = guides_[v];
     for (std::size_t k = 0; k < kGuides; ++k) {
       const std::int32_t c = guides.vertex[k];
       if (guides.weight[k] == 0) continue;
-      const Eigen::RowVector3d offset = rest - fine.scaled_positions().row(fine_vertex_[c]);
-      sum += guides.weight[k] * (moved.row(c) + offset * rotations[c].transpose());
+      const Eigen::RowVector3d offset = from.row(row) - before.positions.row(c);
+      sum += guides.weight[k] * (now.positions.row(c) + offset * coarse_turns[c]);
+      turn += guides.weight[k] * coarse_turns[c];
     }
-    result.row(v) = sum;
+    result.row(row) = sum;
+    if (turns) (*turns)[v] = turn;
   };
   workers.for_chunks(guides_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) place(static_cast<Eigen::Index>(v));
+    for (std::size_t v = begin; v < end; ++v) place(v);
   });
   return result;
 }
 
+Points CoarseLevel::prolong(const RestShape& fine, const Workers& workers) const {
+  return carried(fine.scaled_positions(), rest_pose(fine), pose(fine, workers), workers, nullptr);
+}
+
 bool CoarseLevel::can_bend_like_fine() const {
-  return (bending_ < 1 || coarse_vertex_.size() >= kLeastEased) &&
+  return (bending_ < 1 || static_cast<std::int32_t>(coarse_vertex_.size()) >= kLeastEased) &&
          shape_->weight_kind() != WeightKind::kUniform;
 }
 
@@ -147,14 +211,10 @@ void CoarseLevel::bend_like_fine() {
   solver_->set_bending(bending_ * ratio);
 }
 
-void CoarseLevel::leave() {
-  if (leaves()) solver_.reset();
-}
-
 std::size_t CoarseLevel::memory_bytes() const {
   return (fine_vertex_.capacity() + coarse_vertex_.capacity()) * sizeof(std::int32_t) +
          share_.capacity() * sizeof(double) + guides_.capacity() * sizeof(Guides) + shape_->memory_bytes() +
-         (solver_ && !leaves() ? solver_->memory_bytes() : 0);
+         solver_->memory_bytes();
 }
 
 }  // namespace lpdeform

@@ -2,6 +2,8 @@
 
 #include <array>
 #include <memory>
+#include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "core/constraints/constraints.h"
@@ -11,6 +13,21 @@
 #include "core/multiresolution/level_solver.h"
 
 namespace lpdeform {
+
+/// What a coarse level takes over from the fine level. `bending` is that of the fine cells (CellPass::set_bending).
+struct FineInputs {
+  const RestShape& shape;
+  const HandleSet& handles;
+  const Constraints& constraints;
+  const Material& material;
+  double bending;
+};
+
+/// How the fine surface goes with a coarse level that has moved.
+struct CoarseMotion {
+  Points positions;                    // scaled units of the fine shape
+  std::vector<Eigen::Matrix3d> turns;  // a row vector d at vertex v becomes d turns[v]; a blend of rotations
+};
 
 /// A coarse level: a shape with a sixth of the fine shape's vertices, a solver of its own, and the restriction and
 /// prolongation between the two levels. This is the "subspace technique" of the paper's future work. Its result is only
@@ -25,14 +42,23 @@ class CoarseLevel {
   /// `coarse` is what coarsened() returns. Null if the mesh could not be coarsened to half its vertices, or if no solver
   /// can be made for the coarse shape.
   static std::unique_ptr<CoarseLevel> create(const RestShape& fine, CoarseMesh coarse,
-                                             MakeLevelSolver make_solver);
+                                             const MakeLevelSolver& make_solver);
 
-  /// Restricts the inputs of the fine level to the coarse solver: coarse_handles, and `material`. A coarse cell stands
+  /// Restricts the inputs of the fine level to the coarse solver: coarse_handles, and the material. A coarse cell stands
   /// for m fine cells, and its E_i^2 is a sum over them. If p_i is not 2, s_i is therefore multiplied by (m /
-  /// kRatio)^(1 - p_i / 2) and clamped to the permitted range. `bending` is that of the fine cells
-  /// (CellPass::set_bending); the coarse cells get the same.
-  absl::Status take_over(const RestShape& fine, const HandleSet& handles, const Constraints& constraints,
-                         const Material& material, double bending);
+  /// kRatio)^(1 - p_i / 2) and clamped to the permitted range. The coarse cells get the bending of the fine cells.
+  absl::Status take_over(const FineInputs& fine);
+
+  /// Whether a coarse level of this shape should lead in a drag: see lead().
+  static bool can_lead(const RestShape& fine, double bending);
+  /// In a drag the coarse level leads: takes the inputs over, with cells that bend like the fine ones, and lets its solver go on from
+  /// its state for a few iterations, the more the smaller the level is. Returns how the fine surface goes with it from `from`
+  /// (scaled units), which belongs to the state of before; from the rest shape if `from` is null. nullopt if the coarse solver does
+  /// not take the inputs. Only if can_lead().
+  std::optional<CoarseMotion> lead(const FineInputs& fine, const Points* from, const Workers& workers,
+                                   std::stop_token stop);
+  /// Takes the inputs over like lead(), and the fine state x (scaled units) as the state of the coarse solver.
+  absl::Status go_to(const FineInputs& fine, const Points& x);
 
   /// Whether bend_like_fine() pays off: the fine level is large, or its own cells already bend like a finer level's, and its
   /// weights are not uniform.
@@ -45,29 +71,30 @@ class CoarseLevel {
 
   static constexpr std::int32_t kLeastEasedLevel = 1000;  // vertices from which on has_level_below()
 
-  /// Only between take_over() and leave().
   LevelSolver& solver() { return *solver_; }
-
-  /// Call when the solver has ended and the fine level goes on. Large levels free their solver, which the fine level's
-  /// workspace then takes the place of; the next take_over() makes it again.
-  void leave();
 
   /// Prolongation: the fine shape moved with the coarse one, in scaled units of the fine shape. Each vertex follows the
   /// fitted rigid motions of the nearest coarse vertices around it, blended by distance.
   Points prolong(const RestShape& fine, const Workers& workers) const;
 
-  /// Without temporary_bytes().
   std::size_t memory_bytes() const;
-  /// Bytes of the solver, if leave() frees it.
-  std::size_t temporary_bytes() const { return leaves() && solver_ ? solver_->memory_bytes() : 0; }
 
  private:
-  CoarseLevel() = default;
-  bool leaves() const { return shape_->vertex_count() > kMostKept; }
-  void find_guides(const RestShape& fine);
+  /// A coarse state: positions in scaled units of the fine shape, and the fitted rotations of the cells.
+  struct Pose {
+    Points positions;
+    std::vector<Eigen::Matrix3d> rotations;
+  };
 
-  static constexpr std::int32_t kMostKept = 10000;   // vertices of a level that keeps its solver
-  static constexpr std::size_t kLeastEased = 30000;  // fine vertices from which on bend_like_fine() pays off
+  CoarseLevel() = default;
+  void find_guides(const RestShape& fine);
+  absl::Status restrict_inputs(const FineInputs& fine);
+  Pose rest_pose(const RestShape& fine) const;
+  Pose pose(const RestShape& fine, const Workers& workers) const;
+  Points carried(const Points& from, const Pose& before, const Pose& now, const Workers& workers,
+                 std::vector<Eigen::Matrix3d>* turns) const;
+
+  static constexpr std::int32_t kLeastEased = 30000;  // fine vertices from which on bend_like_fine() pays off
 
   static constexpr std::size_t kGuides = 4;
   struct Guides {
@@ -79,8 +106,7 @@ class CoarseLevel {
   std::vector<Guides> guides_;                             // of each fine vertex
   std::shared_ptr<const RestShape> shape_;
   double bending_ = 1;  // of the fine level
-  MakeLevelSolver make_solver_;
-  std::unique_ptr<LevelSolver> solver_;  // null if leave() has freed it
+  std::unique_ptr<LevelSolver> solver_;
 };
 
 }  // namespace lpdeform

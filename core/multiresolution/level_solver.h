@@ -21,6 +21,7 @@ class LevelSolver {
   virtual absl::Status set_material(const Material& material) = 0;
   virtual void set_bending(double share) = 0;
   virtual absl::Status set_handles(const HandleSet& handles) = 0;
+  virtual absl::Status set_positions(const Points& positions) = 0;
   virtual absl::Status start(const SolveSettings& settings, std::stop_token stop) = 0;
   virtual bool step() = 0;
   virtual void catch_up(bool is_last) = 0;

@@ -116,7 +116,6 @@ bool Multiresolution::begin_to_ease() {
 /// Starts QuasiNewton from the better of the guess and the result of the coarse level.
 void Multiresolution::begin_fine() {
   Points found = prolonged();
-  level_.leave();
   const bool is_better = found.allFinite() && problem_.objective.evaluate(found, problem_.norm) < objective_;
   if (is_better) {
     x_.swap(found);

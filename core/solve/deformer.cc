@@ -102,7 +102,9 @@ absl::Status Deformer::set_handles(const HandleSet& handles) {
 
 void Deformer::set_bending(double share) {
   impl_->change_inputs();
+  if (share == impl_->bending) return;
   impl_->bending = share;
+  impl_->lead = Impl::Lead::kNone;
   impl_->objective.set_bending(share);
 }
 
@@ -110,7 +112,9 @@ absl::Status Deformer::set_material(const Material& material) {
   if (absl::Status status = check_material(material, impl_->shape->vertex_count()); !status.ok())
     return status;
   impl_->change_inputs();
+  if (material == impl_->material) return absl::OkStatus();
   impl_->material = material;
+  impl_->lead = Impl::Lead::kNone;
   impl_->forget_weights();
   return absl::OkStatus();
 }
@@ -119,6 +123,7 @@ absl::Status Deformer::set_positions(const Points& positions) {
   if (absl::Status status = check_positions(*impl_->shape, positions); !status.ok()) return status;
   impl_->change_inputs();
   impl_->x_before_move.resize(0, 3);
+  impl_->lead = Impl::Lead::kNone;
   impl_->x = (positions.rowwise() - impl_->shape->centre()) / impl_->unit();
   impl_->positions = positions;
   impl_->is_positions_current = true;
@@ -236,13 +241,10 @@ std::size_t Deformer::memory_bytes() const {
       impl_->x.size() + impl_->positions.size() + impl_->x_before_move.size() + impl_->best_energies.size();
   const std::size_t held = impl_->constraints ? impl_->constraints->memory_bytes() : 0;
   const std::size_t coarse = impl_->coarse ? impl_->coarse->memory_bytes() : 0;
-  // A solver that leaves runs before the fine level has a workspace.
-  const std::size_t workspace =
-      std::max(kWorkspace * points, impl_->coarse ? impl_->coarse->temporary_bytes() : 0);
   const std::size_t searched = (impl_->better ? points : 0) + (impl_->search ? 3 * points : 0);
   const std::size_t looked_at = impl_->best_step ? points : 0;
   return sizeof(Impl) + searched + looked_at + held + coarse + impl_->objective.cells().memory_bytes() +
-         impl_->metric.memory_bytes() + numbers * sizeof(double) + workspace +
+         impl_->metric.memory_bytes() + numbers * sizeof(double) + kWorkspace * points +
          (impl_->coarse_mesh ? impl_->coarse_mesh->memory_bytes() : 0);
 }
 

@@ -1,6 +1,7 @@
 #include "core/solve/deformer_impl.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 namespace lpdeform {
@@ -32,6 +33,41 @@ Points Deformer::Impl::laplacian_guess() {
   return shape->scaled_positions() + u;
 }
 
+/// A drag that the coarse level leads: it goes to the handles first, and the surface goes with it. Each edge turns as the surface
+/// around it does, and one solve in the metric fits the edges together between the handles.
+std::optional<Points> Deformer::Impl::led_guess() {
+  if (lead == Lead::kNone) return std::nullopt;
+  const bool is_ahead = std::exchange(lead, Lead::kNone) == Lead::kAhead;
+  const Points& from = is_ahead ? shape->scaled_positions() : x;
+  const auto motion =
+      coarse->lead(coarse_inputs(effective_material()), is_ahead ? nullptr : &x, workers(), stop);
+  if (!motion) return std::nullopt;
+  const Points& moved = motion->positions;
+  Points u = Points::Zero(x.rows(), 3), forces = u;
+  metric.add_edge_forces(
+      [&](std::int32_t i, std::int32_t j) -> Eigen::RowVector3d {
+        const Eigen::Matrix3d turn = 0.5 * (motion->turns[i] + motion->turns[j]);
+        return (from.row(i) - from.row(j)) * turn - (moved.row(i) - moved.row(j));
+      },
+      workers(), forces);
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
+    if (constraints->is_held[i]) u.row(i) = constraints->targets.row(i) - moved.row(i);
+  }
+  metric.extend(constraints->is_held, u, workers(), &forces);
+  u += moved;
+  if (!u.allFinite()) return std::nullopt;
+  lead = Lead::kTogether;
+  x_before_move.resize(0, 3);
+  // If some p_i > 2, the weights of the move before differ so much that a step in their metric is cut short.
+  if (material.p.maxCoeff() > 2) warmth = Warmth::kWarm;
+  return u;
+}
+
+/// Lets the coarse level, where there is one, follow to `guess`, so that it can lead from the next move on.
+void Deformer::Impl::follow(const Points& guess) {
+  if (make_coarse() && coarse->go_to(coarse_inputs(effective_material()), guess).ok()) lead = Lead::kTogether;
+}
+
 /// Extrapolates a drag: if the handles move in about the same way as the last time, by the factor `share` of that move,
 /// the surface does the same. The remaining displacement of handles and soft targets is extended harmonically.
 Points Deformer::Impl::current_guess() {
@@ -50,6 +86,10 @@ Points Deformer::Impl::current_guess() {
   const SoftTerms& before = objective.soft_terms();
   if (constraints->soft.has_rows_of(before)) constraints->soft.add_pull(before, forces);
   if (left == 0 && forces.isZero(0)) return x;
+  const bool can_lead = warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, bending);
+  if (can_lead) {
+    if (std::optional<Points> led = led_guess()) return *std::move(led);
+  }
   const double share = size > 0 ? along / size : 0;
   const bool goes_on = share > 0 && share < kFarthestGuess && along * along > kSameWay * size * left &&
                        last.rowwise().squaredNorm().maxCoeff() < kSteady * longest;
@@ -61,7 +101,9 @@ Points Deformer::Impl::current_guess() {
   }
   metric.extend(constraints->is_held, u, workers(), &forces);
   if (goes_on) u += share * last;
-  return x + u;
+  Points guess = x + u;
+  if (can_lead && guess.allFinite()) follow(guess);
+  return guess;
 }
 
 Points Deformer::Impl::initial_guess(InitialGuess guess) {

@@ -33,6 +33,7 @@ class DeformerOfLevel : public LevelSolver {
   void set_bending(double share) override { deformer_->set_bending(share); }
   absl::Status set_material(const Material& material) override { return deformer_->set_material(material); }
   absl::Status set_handles(const HandleSet& handles) override { return deformer_->set_handles(handles); }
+  absl::Status set_positions(const Points& positions) override { return deformer_->set_positions(positions); }
   absl::Status start(const SolveSettings& settings, std::stop_token stop) override {
     return deformer_->start(settings, std::move(stop));
   }
@@ -104,9 +105,8 @@ Problem Deformer::Impl::make_problem() {
           stop};
 }
 
-/// Makes the coarse level if there is none, and restricts the inputs to it. False if the mesh cannot be coarsened, or
-/// if the coarse level has no vertices for the handles.
-bool Deformer::Impl::prepare_coarse() {
+/// Makes the coarse level if there is none. False if the mesh cannot be coarsened.
+bool Deformer::Impl::make_coarse() {
   const auto make_solver = [this](std::shared_ptr<const RestShape> level) -> std::unique_ptr<LevelSolver> {
     const DeformerOptions of_level{.free_components = FreeComponents::kStay,
                                    .threads = workers().threads(),
@@ -119,7 +119,18 @@ bool Deformer::Impl::prepare_coarse() {
     CoarseMesh mesh = coarse_mesh ? *std::exchange(coarse_mesh, {}) : CoarseLevel::coarsened(*shape);
     coarse = CoarseLevel::create(*shape, std::move(mesh), make_solver);
   }
-  return coarse && coarse->take_over(*shape, handles, *constraints, effective_material(), bending).ok();
+  return coarse != nullptr;
+}
+
+FineInputs Deformer::Impl::coarse_inputs(const Material& effective) const {
+  return {*shape, handles, *constraints, effective, bending};
+}
+
+/// Makes the coarse level if there is none, and restricts the inputs to it, for a solve that begins there. False if the mesh cannot
+/// be coarsened, or if the coarse level has no vertices for the handles.
+bool Deformer::Impl::prepare_coarse() {
+  lead = Lead::kNone;
+  return make_coarse() && coarse->take_over(coarse_inputs(effective_material())).ok();
 }
 
 Method Deformer::Impl::chosen_method(Method asked, bool is_warm) {
@@ -261,7 +272,10 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   back_substitutions_before = metric.back_substitutions();
   metric_before = metric.version();
   const bool is_warm = settings.initial == InitialGuess::kCurrent && state == State::kDeformed;
-  if (!is_warm) x_before_move.resize(0, 3);
+  if (!is_warm) {
+    x_before_move.resize(0, 3);
+    lead = Lead::kNone;
+  }
   if (!settings.effort) settings.effort = default_effort(is_warm);
   summary.effort = *settings.effort;
   const bool keeps_metric =
@@ -302,10 +316,11 @@ void Deformer::Impl::iterate() {
   ++summary.iterations;
   if (search) return search_on();
   const StepResult result = minimiser->step();
+  if (settings.method == Method::kMultiresolution) lead = result.stage == 0 ? Lead::kAhead : Lead::kTogether;
   double sum = result.true_sum ? *result.true_sum : objective.sum(*norm);
   keep_if_best(sum);
   const bool is_over = result.outcome == Outcome::kConverged || result.outcome == Outcome::kStalled;
-  if (is_over && warmth == Warmth::kWithMetric && keep_rest_if_best()) sum = best_sum;
+  if (is_over && warmth != Warmth::kCold && keep_rest_if_best()) sum = best_sum;
   record(result, sum);
   switch (result.outcome) {
     case Outcome::kProgress:
@@ -341,7 +356,6 @@ void Deformer::Impl::end_minimiser(StopReason reason) {
   else if (settings.method == Method::kMultiresolution)
     forget_weights();
   minimiser.reset();
-  if (coarse) coarse->leave();
   state = is_best_zero() ? State::kUndistorted : State::kDeformed;
   summary.stop_reason = reason;
   summary.solve_seconds = seconds();
@@ -385,7 +399,10 @@ void Deformer::Impl::replace_constraints(Constraints next) {
         next.footprint.size() == constraints->footprint.size() && next.footprint == constraints->footprint;
     const bool has_rows_of_before =
         next.linear.reuse(constraints->linear) && next.soft.has_rows_of(constraints->soft);
-    if (!has_footprint_of_before) forget_weights();
+    if (!has_footprint_of_before) {
+      forget_weights();
+      lead = Lead::kNone;
+    }
     if (!has_rows_of_before) factor = Factor::kOutdated;
   }
   constraints = std::move(next);

@@ -37,6 +37,9 @@ struct Deformer::Impl {
 
   Points laplacian_guess();
   Points current_guess();
+  std::optional<Points> led_guess();
+  void follow(const Points& guess);
+  FineInputs coarse_inputs(const Material& effective) const;
   SoftTerms guess_springs() const;
   Points initial_guess(InitialGuess guess);
   double typical_energy(const Points& guess);
@@ -46,6 +49,7 @@ struct Deformer::Impl {
   bool is_best_zero() const;
   Problem make_problem();
   Method chosen_method(Method asked, bool is_warm);
+  bool make_coarse();
   bool prepare_coarse();
   std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, Warmth warmth);
   bool prepare_metric(bool needs_plain_weights);
@@ -138,6 +142,12 @@ struct Deformer::Impl {
   std::stop_token stop;
   std::optional<LpNorm> norm;           // true norm, and the reference of the running solve
   std::unique_ptr<CoarseLevel> coarse;  // made when first needed
+  enum class Lead {
+    kNone,   // the coarse level's state has nothing to do with x
+    kAhead,  // it is for the same inputs, but x is at most a look at it (Multiresolution::intermediate_state)
+    kTogether,  // it is for the same inputs
+  };
+  Lead lead = Lead::kNone;
   std::unique_ptr<Minimiser> minimiser;
   std::unique_ptr<MinimaSearch> search;      // runs after the minimiser has ended
   bool is_search_apart = false;              // its result goes to `better`, not to x

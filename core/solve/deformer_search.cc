@@ -195,9 +195,9 @@ void Deformer::Impl::end_search() {
   if (takes_it) {
     keep(search->lowest(), search->lowest_sum());
     x_before_move.resize(0, 3);
+    lead = Lead::kNone;
   }
   search.reset();
-  if (coarse) coarse->leave();
   if (!is_search_apart) record({Outcome::kProgress, best_sum, search_stage}, best_sum);
 }
 
@@ -215,6 +215,7 @@ void Deformer::Impl::take_better() {
   keep(better->x, better->sum);
   better.reset();
   x_before_move.resize(0, 3);
+  lead = Lead::kNone;
   summary.energy = norm->true_energy(best_sum);
   summary.soft_energy = norm->true_energy(best_soft_sum);
   summary.optimality_gap.reset();

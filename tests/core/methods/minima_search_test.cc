@@ -217,9 +217,10 @@ TEST_F(MinimaSearchTest, AMoveAfterASearchThatFoundNothingIsAsWithoutOne) {
     const absl::Status status = searches ? solver->start_search(1) : absl::OkStatus();
     EXPECT_TRUE(status.ok());
     run(*solver);
-    // At most another end at the same minimum: without CHOLMOD a start ends 6e-8 lower, within the tolerance of a solve.
+    // At most another end at the same minimum, as near as two solves to the same tolerance come: a start ends 6e-8 lower without
+    // CHOLMOD, and 2e-6 with Eigen 5.
     const double first = solver->summary().energy;
-    EXPECT_GT(solver->better_energy().value_or(first), (1 - 1e-6) * first);
+    EXPECT_GT(solver->better_energy().value_or(first), (1 - 1e-5) * first);
     EXPECT_TRUE(solver->set_handles(lifted_grid(5.1).handles).ok());
     return solver->solve({.max_iterations = most_iterations}).value();
   };

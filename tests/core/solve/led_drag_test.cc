@@ -1,0 +1,128 @@
+// Drags of meshes so large that each move has time for few iterations only: coarse levels lead them.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/core/poses.h"
+
+namespace lpdeform {
+namespace {
+
+/// A bumpy sheet whose right edge turns by three degrees with each move.
+class LedDragTest : public testing::TestWithParam<double> {
+ protected:
+  static constexpr int kSide = 174;  // 30,625 vertices
+
+  LedDragTest() { EXPECT_TRUE(live->solve({}).ok()); }
+
+  HandleSet bent(int moves) const {
+    HandleSet handles;
+    (void)handles.set("left", {slice(mesh, 0, 0, 0), Fixed{}});
+    (void)handles.set("right", {right, turn(Eigen::Vector3d::UnitY(), -3.0 * moves, {0.5 * kSide, 0, 0},
+                                            {0, 0, 0.2 * kSide / 30 * moves})});
+    return handles;
+  }
+  static SolveSummary solve(Deformer& deformer, int max_iterations) {
+    SolveSettings settings{.max_iterations = max_iterations, .effort = 0};
+    return deformer.solve(settings).value();
+  }
+  SolveSummary move(int number, int max_iterations = 1) const {
+    EXPECT_TRUE(live->set_handles(bent(number)).ok());
+    return solve(*live, max_iterations);
+  }
+  /// E^(1/p) over that of the minimum which the live state comes to when the drag has ended.
+  double above_minimum(const SolveSummary& summary) const {
+    return std::pow(summary.energy / solve(*live, 1000).energy, 1 / GetParam());
+  }
+
+  const TriangleMesh mesh = grid(kSide, kSide, 2);
+  const std::vector<std::int32_t> right = slice(mesh, 0, kSide, kSide);
+  const std::shared_ptr<const RestShape> shape = rest_shape(mesh);
+  const std::unique_ptr<Deformer> live = deformer(shape, bent(0), Material::uniform(GetParam()));
+};
+
+/// Without coarse levels that lead, it is 9.7, 9.2 and 18 times the minimum after 12 such moves.
+TEST_P(LedDragTest, KeepsNearTheMinimum) {
+  for (int number = 1; number < 12; ++number) (void)move(number);
+  const SolveSummary last = move(12);
+  EXPECT_LE(above_minimum(last), GetParam() == 6 ? 1.6 : 1.2);
+}
+
+TEST_P(LedDragTest, FramesDoNotJump) {
+  Points before;
+  double farthest = 0, of_handle = 0;
+  for (int number = 1; number <= 8; ++number) {
+    (void)move(number);
+    const Points now = live->positions();
+    if (number > 3) {  // the sheet has left its rest shape
+      farthest = std::max(farthest, (now - before).rowwise().norm().maxCoeff());
+      of_handle =
+          std::max(of_handle, (rows_of(now, right) - rows_of(before, right)).rowwise().norm().maxCoeff());
+    }
+    before = now;
+  }
+  EXPECT_LE(farthest, 1.5 * of_handle);
+}
+
+INSTANTIATE_TEST_SUITE_P(Norms, LedDragTest, testing::Values(1.5, 2.0, 6.0));
+
+class LedDragAtTwoTest : public LedDragTest {};
+
+TEST_P(LedDragAtTwoTest, GivesTheSameBitsOnAnyNumberOfThreads) {
+  auto other = deformer(shape, bent(0), Material::uniform(2), {.threads = 2});
+  (void)other->solve({});
+  for (int number = 1; number <= 3; ++number) {
+    (void)move(number);
+    ASSERT_TRUE(other->set_handles(bent(number)).ok());
+    (void)solve(*other, 1);
+  }
+  EXPECT_EQ(live->positions(), other->positions());
+}
+
+/// The coarse levels have been where the surface is not.
+TEST_P(LedDragAtTwoTest, GoesOnFromPositionsThatWereSet) {
+  for (int number = 1; number <= 4; ++number) (void)move(number);
+  (void)solve(*live, 1000);
+  const Points undone = live->positions();
+  for (int number = 5; number <= 12; ++number) (void)move(number);
+  ASSERT_TRUE(live->set_positions(undone).ok());
+  for (int number = 5; number < 8; ++number) (void)move(number);
+  EXPECT_LE(above_minimum(move(8)), 1.2);
+}
+
+/// The shape for another p is the fine level's own. It must not come a second time, from the coarse levels.
+TEST_P(LedDragAtTwoTest, GoesOnAfterAChangeOfP) {
+  for (int number = 1; number <= 8; ++number) (void)move(number);
+  ASSERT_TRUE(live->set_material(Material::uniform(1.5)).ok());
+  const double energy = solve(*live, 1000).energy;
+  ASSERT_TRUE(live->set_material(Material::uniform(2)).ok());
+  (void)solve(*live, 1000);
+  ASSERT_TRUE(live->set_material(Material::uniform(1.5)).ok());
+  EXPECT_LE(solve(*live, 1000).energy, 1.01 * energy);
+  for (int number = 9; number < 12; ++number) (void)move(number);
+  const double last = move(12).energy;
+  EXPECT_LE(std::pow(last / solve(*live, 1000).energy, 1 / 1.5), 1.3);
+}
+
+TEST_P(LedDragAtTwoTest, ComesBackToRest) {
+  for (const int number : {1, 2, 3, 2, 1}) (void)move(number);
+  (void)move(0, 600);
+  EXPECT_LE((live->positions() - mesh.vertices).rowwise().norm().maxCoeff(), 1e-5 * kSide);
+}
+
+TEST_P(LedDragAtTwoTest, ACancelledMoveLeavesAFiniteStateAndTheNextGoesOn) {
+  (void)move(1);
+  std::stop_source stop;
+  stop.request_stop();
+  ASSERT_TRUE(live->set_handles(bent(2)).ok());
+  ASSERT_TRUE(live->solve({.effort = 0}, stop.get_token()).ok());
+  EXPECT_TRUE(live->positions().allFinite());
+  for (int number = 3; number < 8; ++number) (void)move(number);
+  EXPECT_LE(above_minimum(move(8)), 1.2);
+}
+
+INSTANTIATE_TEST_SUITE_P(AtTwo, LedDragAtTwoTest, testing::Values(2.0));
+
+}  // namespace
+}  // namespace lpdeform
