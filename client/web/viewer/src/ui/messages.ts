@@ -89,7 +89,21 @@ export function messages(app: App, startOver: () => void): HTMLElement {
     },
   );
   app.view.watchAll(showHint);
+  makeWay(app, notice);
   return el("div", { className: "messages" }, pill.element, banner, restored, asideNote(app), hint, betterButton(app), notice);
+}
+
+/** Lets no notice lie over what is dragged in a picture: a press ends it, or hides it for so long if it has still to be read. */
+function makeWay(app: App, notice: HTMLElement): void {
+  const hide = (isHidden: boolean) => notice.classList.toggle("makes-way", isHidden);
+  const press = () => {
+    const { notice: now } = app.facts.now;
+    if (now && !now.isBad && !now.stays) app.facts.set({ notice: undefined });
+    hide(true);
+  };
+  // Before the picture has the event: its press may make a notice of its own.
+  app.stages.addEventListener("pointerdown", press, { capture: true });
+  for (const end of ["pointerup", "pointercancel"]) window.addEventListener(end, () => hide(false), { capture: true });
 }
 
 /** There while the server knows a shape of lower energy; takes those of all panes. */
