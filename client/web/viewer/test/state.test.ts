@@ -1,4 +1,5 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
+import { LpdeformError } from "lpdeform-client";
 import { Pulse } from "../src/link/pulse.js";
 import { State } from "../src/model/state.js";
 
@@ -121,7 +122,8 @@ describe("the pulse", () => {
   });
 
   it("takes a refusal for an answer, and asks nothing once it is stopped", async () => {
-    const ask = vi.fn<() => Promise<void>>(() => Promise.reject(new Error("no")));
+    const refusal = new LpdeformError("not_found", "no", { reason: "SESSION_UNKNOWN" });
+    const ask = vi.fn<() => Promise<void>>(() => Promise.reject(refusal));
     const changed = vi.fn();
     const pulse = new Pulse(ask, changed);
     pulse.start();
@@ -132,5 +134,21 @@ describe("the pulse", () => {
     await after(3000);
     expect(ask).toHaveBeenCalledTimes(length);
     expect(changed).not.toHaveBeenCalled();
+  });
+
+  it("stays silent while a proxy answers for a server that it does not reach", async () => {
+    let isReached = false;
+    const told: boolean[] = [];
+    const pulse: Pulse = new Pulse(
+      () => (isReached ? Promise.resolve() : Promise.reject(new LpdeformError("unavailable", "no healthy upstream"))),
+      () => told.push(pulse.isSilent),
+    );
+    pulse.start();
+    await after(3000);
+    expect(told).toEqual([true]);
+    isReached = true;
+    await after(1000);
+    expect(told).toEqual([true, false]);
+    pulse.stop();
   });
 });
