@@ -414,6 +414,11 @@ export class App implements Workbench {
     if (!isAlike(better, this.facts.now.better)) this.facts.set({ better });
   }
 
+  /** After a failure at which the page has stopped trying. */
+  tryAgain(): void {
+    for (const { live } of this.panes) live?.tryAgain();
+  }
+
   /** In every pane. */
   takeBetter(): void {
     for (const { live } of this.panes) void live?.takeBetter();

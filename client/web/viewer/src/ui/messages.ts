@@ -20,12 +20,14 @@ export function messages(app: App, startOver: () => void): HTMLElement {
   const title = el("strong");
   const text = el("span");
   const show = el("button", { type: "button", className: "plain", textContent: "Show where" });
+  const again = el("button", { type: "button", className: "plain", textContent: "Try again", hidden: true });
   const banner = el(
     "div",
     { className: "banner", role: "alert", hidden: true },
     el("span", { className: "spinner" }),
     el("div", {}, title, text),
     show,
+    again,
   );
   const notice = el("div", { className: "notice", role: "status", hidden: true });
   const hint = measured(el("div", { className: "hint" }), "--hint-height");
@@ -34,6 +36,7 @@ export function messages(app: App, startOver: () => void): HTMLElement {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let late: ReturnType<typeof setTimeout> | undefined;
   show.addEventListener("click", () => pointOutNamed(app, element));
+  again.addEventListener("click", () => app.tryAgain());
 
   const showStatus = (status: Status) => {
     pill.show(status);
@@ -46,6 +49,7 @@ export function messages(app: App, startOver: () => void): HTMLElement {
     banner.dataset["kind"] = isProblem ? "refused" : status.kind;
     const { vertices, edges, faces } = elementsIn(element, app.document.handles);
     show.hidden = vertices.length + edges.length + faces.length === 0;
+    again.hidden = !status.canTryAgain;
     banner.hidden = !isWrong && !isProblem;
   };
   const stopWaiting = () => {

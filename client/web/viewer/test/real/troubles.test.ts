@@ -113,6 +113,28 @@ describe("the page says plainly, and goes on by itself when", () => {
     await user.page.locator(".banner").waitFor({ state: "hidden" });
   });
 
+  it("the page itself fails with every frame: it stops after some tries, and tries again when it is told to", async () => {
+    const service = await start();
+    const user = await visit(service);
+    await user.settled();
+    await user.page.evaluate(() => {
+      const { watcher } = (window as any).__lpdeform.app.panes[0].live;
+      const { frame } = watcher;
+      watcher.frame = () => {
+        throw new RangeError("Array buffer allocation failed");
+      };
+      Object.assign(window, { mend: () => (watcher.frame = frame) });
+    });
+    await user.ask(`app.change({ ...window.__lpdeform.document(), p: 3 })`);
+    await banner(user, "This page fails with every frame");
+    expect(await user.page.locator(".banner").textContent()).toContain("RangeError: Array buffer allocation failed.");
+    await user.page.evaluate("mend()");
+    await user.page.locator(".banner").getByRole("button", { name: "Try again" }).click();
+    await user.settled();
+    await user.page.locator(".banner").waitFor({ state: "hidden" });
+    expect(user.errors).toEqual([]);
+  });
+
   it("there is no server yet", async () => {
     const service = await start();
     await service.killServer();
