@@ -133,6 +133,18 @@ it("a mesh from a file comes back, and is deleted on demand, for good", async ()
   expect(await note().isHidden()).toBe(true);
 });
 
+it("a mesh from a file comes back however soon the page is reloaded, beside work that it replaced", async () => {
+  const names = ["soon.off", "sooner.off"];
+  await bend();
+  for (const name of names) {
+    await user.openFiles({ name, content: writeOff(blockSurface(2, 2, 6, () => true)) });
+    await user.until(`window.__lpdeform.app.mesh.name === '${name}'`);
+    await reload();
+    expect(await user.ask("app.mesh.name")).toBe(name);
+  }
+  expect(await user.ask("app.facts.now.setAside.map(({ name }) => name)")).toEqual([names[0], "bar"]);
+});
+
 it("work that another shape or a file replaced, or that was discarded, is brought back", async () => {
   await bend();
   const bent = await work();
@@ -198,10 +210,12 @@ it("work that was set aside stays, however much is opened after it and left as i
   expect([await work(), await user.ask("app.mesh.name"), await user.ask("app.view.now.shape")]).toEqual([bent, "bar", "bar"]);
   expect(await note().textContent()).toContain("“bar” is here again");
 
-  await user.openFiles(tower); // a mesh that one has anyway is not worth more than work
+  await user.openFiles(tower); // the mesh of a file is there again, and so is the work
   await user.until("window.__lpdeform.app.mesh.name === 'tower.off'");
-  await user.page.waitForTimeout(700);
   await reload();
+  expect(await user.ask("app.mesh.name")).toBe("tower.off");
+  await aside.getByRole("button", { name: "Bring it back" }).click();
+  await user.settled();
   expect(await work()).toBe(bent);
 });
 
