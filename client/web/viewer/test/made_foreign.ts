@@ -89,8 +89,8 @@ Connections:  {
 `;
 }
 
-/** A binary FBX of this version without a mesh: a node with a few properties, and in it one with `count` packed truths. */
-export function makeBinaryFbx(version: number, count: number): Buffer {
+/** A binary FBX of this version without a mesh: a node with a few properties, and in it one for each of `counts`, of packed truths. */
+export function makeBinaryFbx(version: number, ...counts: number[]): Buffer {
   const number = (value: number) => Buffer.from(Uint32Array.of(value).buffer);
   const field = (value: number) => (version >= 7500 ? Buffer.from(BigUint64Array.of(BigInt(value)).buffer) : number(value));
   const node = (name: string, count: number, properties: Buffer) =>
@@ -102,12 +102,15 @@ export function makeBinaryFbx(version: number, count: number): Buffer {
       Buffer.from(name),
       properties,
     ]);
-  const packed = deflateSync(new Uint8Array(count));
+  const truths = (count: number) => {
+    const packed = deflateSync(new Uint8Array(count));
+    return Buffer.concat([Buffer.from("b"), number(count), number(1), number(packed.length), packed]);
+  };
   return Buffer.concat([
     Buffer.from("Kaydara FBX Binary  \0\x1a\0"),
     number(version),
     node("Objects", 4, Buffer.concat([Buffer.from("S"), number(3), Buffer.from("abcC\x01D12345678R"), number(0)])),
-    node("Truths", 1, Buffer.concat([Buffer.from("b"), number(count), number(1), number(packed.length), packed])),
+    ...counts.map((count) => node("Truths", 1, truths(count))),
     Buffer.alloc(300),
   ]);
 }
