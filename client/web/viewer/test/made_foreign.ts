@@ -5,21 +5,28 @@ import { strToU8, zipSync } from "three/addons/libs/fflate.module.js";
 // is at the origin.
 
 export const [rows, columns] = [16, 12];
-const points = Array.from({ length: (rows + 1) * columns }, (_, k) => {
-  const angle = (2 * Math.PI * (k % columns)) / columns;
-  return [Math.cos(angle), Math.sin(angle), (8 * Math.floor(k / columns)) / rows];
-});
-const triangles = Array.from({ length: rows * columns }, (_, k) => {
-  const row = Math.floor(k / columns) * columns;
-  const [a, b] = [row + (k % columns), row + ((k + 1) % columns)];
-  return [
-    [a, b, b + columns],
-    [a, b + columns, a + columns],
-  ];
-}).flat();
+
+/** `rows` of faces, and one more of vertices. */
+export function tubeOf(rows: number, columns: number) {
+  const points = Array.from({ length: (rows + 1) * columns }, (_, k) => {
+    const angle = (2 * Math.PI * (k % columns)) / columns;
+    return [Math.cos(angle), Math.sin(angle), (8 * Math.floor(k / columns)) / rows];
+  });
+  const triangles = Array.from({ length: rows * columns }, (_, k) => {
+    const row = Math.floor(k / columns) * columns;
+    const [a, b] = [row + (k % columns), row + ((k + 1) % columns)];
+    return [
+      [a, b, b + columns],
+      [a, b + columns, a + columns],
+    ];
+  }).flat();
+  return { points, triangles };
+}
+
+const small = tubeOf(rows, columns);
 
 /** COLLADA with z up, a colour, and a texture at an address on the net. */
-export function makeDae(): string {
+export function makeDae({ points, triangles } = small): string {
   return `<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
   <asset><unit name="meter" meter="1"/><up_axis>Z_UP</up_axis></asset>
@@ -50,7 +57,7 @@ export function makeDae(): string {
 }
 
 /** FBX 7.4 as text, with y up: z of the tube is y of the file. */
-export function makeFbx(): string {
+export function makeFbx({ points, triangles } = small): string {
   const places = points.flatMap(([x, y, z]) => [x, z, -y!]);
   const corners = triangles.flatMap(([a, b, c]) => [a, b, -c! - 1]); // the last corner of each face is turned about
   return `; FBX 7.4.0 project file
@@ -116,7 +123,7 @@ export function makeBinaryFbx(version: number, ...counts: number[]): Buffer {
 }
 
 /** 3MF, which is a ZIP file. `padding`: bytes of zeros beside. */
-export function make3mf(padding = 0): Uint8Array {
+export function make3mf(padding = 0, { points, triangles } = small): Uint8Array {
   const model = `<?xml version="1.0" encoding="UTF-8"?>
 <model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>
   <object id="1" type="model" name="pipe"><mesh>
