@@ -9,7 +9,7 @@ import { unpackedZipBytes } from "./unpacked.js";
 export type Reply = Converted | { fault: string } | { isForPage: true };
 
 /** Of a 3MF file unpacked: its XML takes about 26 times as much here. */
-const mostBytes = 64e6;
+const mostBytes = 32e6;
 
 const scope = globalThis as unknown as {
   postMessage(reply: Reply, transfer?: ArrayBuffer[]): void;
