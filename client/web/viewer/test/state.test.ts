@@ -35,6 +35,21 @@ describe("a watcher", () => {
     expect(told).toEqual([0, 2]);
   });
 
+  it("is told nothing any more, and let go, when its signal aborts", () => {
+    const state = new State(values);
+    const over = new AbortController();
+    const told: number[] = [];
+    state.watch(
+      ({ pointer }) => [pointer],
+      ([pointer]) => told.push(pointer),
+      over.signal,
+    );
+    state.set({ pointer: 1 });
+    over.abort();
+    state.set({ pointer: 2 });
+    expect(told).toEqual([0, 1]);
+  });
+
   it("of everything is told of each change", () => {
     const state = new State(values);
     const told: number[][] = [];
