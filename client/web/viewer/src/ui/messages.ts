@@ -32,6 +32,7 @@ export function messages(app: App, startOver: () => void): HTMLElement {
   const notice = el("div", { className: "notice", role: "status", hidden: true });
   const hint = measured(el("div", { className: "hint" }), "--hint-height");
   const restored = restoredNote(app, startOver);
+  const aside = asideNote(app);
   let element = "";
   let timer: ReturnType<typeof setTimeout> | undefined;
   let late: ReturnType<typeof setTimeout> | undefined;
@@ -62,10 +63,8 @@ export function messages(app: App, startOver: () => void): HTMLElement {
     showHint();
   };
   const showHint = () => {
-    const { restoredFrom, setAside } = app.facts.now;
     setText(hint, hintOf(app));
-    hint.hidden =
-      app.isWatching || hint.textContent === "" || !banner.hidden || restoredFrom !== undefined || setAside.length > 0;
+    hint.hidden = app.isWatching || hint.textContent === "" || !banner.hidden || app.facts.now.restoredFrom !== undefined;
   };
   app.facts.watch(
     ({ status, problem }) => [status, problem],
@@ -77,10 +76,7 @@ export function messages(app: App, startOver: () => void): HTMLElement {
       showHint();
     },
   );
-  app.facts.watch(
-    ({ document, canUndo, restoredFrom, setAside }) => [document.handles.length, canUndo, restoredFrom, setAside],
-    showHint,
-  );
+  app.facts.watch(({ document, canUndo, restoredFrom }) => [document.handles.length, canUndo, restoredFrom], showHint);
   app.facts.watch(
     ({ notice }) => [notice],
     ([now]) => {
@@ -94,7 +90,8 @@ export function messages(app: App, startOver: () => void): HTMLElement {
   );
   app.view.watchAll(showHint);
   makeWay(app, notice);
-  return el("div", { className: "messages" }, pill.element, banner, restored, asideNote(app), hint, betterButton(app), notice);
+  app.stages.addEventListener("pointerdown", () => aside.classList.add("small"), { capture: true });
+  return el("div", { className: "messages" }, pill.element, banner, restored, aside, hint, betterButton(app), notice);
 }
 
 /** Lets no notice lie over what is dragged in a picture: a press ends it, or hides it for so long if it has still to be read. */
@@ -162,10 +159,12 @@ function asideNote(app: App): HTMLElement {
     ([setAside]) => {
       const [newest] = setAside;
       note.hidden = newest === undefined;
+      note.classList.remove("small");
       which.hidden = setAside.length < 2;
       which.replaceChildren(...setAside.map(({ id, name }) => el("option", { value: String(id), textContent: name })));
       if (!newest) return;
       const one = `“${newest.name}” was set aside with your work on it.`;
+      back.title = setAside.length > 1 ? "" : one;
       setText(text, setAside.length > 1 ? `${setAside.length} were set aside with your work:` : one);
     },
   );

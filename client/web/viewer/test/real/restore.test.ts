@@ -185,6 +185,23 @@ it("work that another shape or a file replaced, or that was discarded, is brough
   expect(await aside.isHidden()).toBe(true);
 });
 
+it("the note of work that was set aside makes room for whoever goes on, and what to do next is said beside it", async () => {
+  await bend();
+  await user.openFiles({ name: "tower.off", content: writeOff(blockSurface(2, 2, 6, () => true)) });
+  const aside = user.page.locator(".aside", { hasText: "“bar” was set aside with your work on it." });
+  await aside.waitFor();
+  await user.page.locator(".hint", { hasText: "Click the surface to place a first handle" }).waitFor();
+  await user.settled();
+  const { width } = (await aside.boundingBox())!;
+  const { x, y } = await user.vertexOnPage(await user.vertexNear([1, 0, 5]));
+  await user.page.mouse.click(x, y);
+  expect(await user.ask("document().handles.length")).toBe(1);
+  expect((await aside.boundingBox())!.width).toBeLessThan(0.6 * width);
+  await aside.getByRole("button", { name: "Bring it back" }).click();
+  await user.until("window.__lpdeform.app.mesh.name === 'bar'");
+  await user.page.locator(".aside", { hasText: "“tower.off” was set aside" }).getByText("was set aside").waitFor();
+});
+
 it("work that was set aside stays, however much is opened after it and left as it was, over a reload too", async () => {
   await bend();
   const bent = await work();
