@@ -91,7 +91,7 @@ export function messages(app: App, startOver: () => void): HTMLElement {
   app.view.watchAll(showHint);
   makeWay(app, notice);
   app.stages.addEventListener("pointerdown", () => aside.classList.add("small"), { capture: true });
-  return el("div", { className: "messages" }, pill.element, banner, restored, aside, hint, betterButton(app), notice);
+  return el("div", { className: "messages" }, pill.element, banner, hint, restored, aside, betterButton(app), notice);
 }
 
 /** Lets no notice lie over what is dragged in a picture: a press ends it, or hides it for so long if it has still to be read. */
