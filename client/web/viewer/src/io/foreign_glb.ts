@@ -28,7 +28,7 @@ export async function glbIn(file: File): Promise<Converted> {
     return { glb: glb as ArrayBuffer, left };
   } catch (error) {
     if (error instanceof FileFault) throw error;
-    throw new FileFault(`${name} cannot be read as ${kinds[kind]}: ${(error as Error).message || "it ends too soon"}.`);
+    throw new FileFault(`${name} cannot be read as ${kinds[kind]}: ${whyOf(error as Error)}.`);
   }
 }
 
@@ -57,6 +57,12 @@ const readers: Record<Kind, (bytes: Uint8Array<ArrayBuffer>) => Promise<Object3D
 /** Every address that a file names is one without contents. */
 function nothingElse(): LoadingManager {
   return new LoadingManager().setURLModifier(() => "data:,");
+}
+
+/** What the readers do not expect in a file is an error of the language, whose words are about their code. */
+function whyOf(error: Error): string {
+  if (error instanceof TypeError || error instanceof RangeError) return "parts of it are missing or damaged";
+  return error.message || "it ends too soon";
 }
 
 let readings = 0;

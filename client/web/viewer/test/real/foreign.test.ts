@@ -93,7 +93,11 @@ describe("the viewer", () => {
     ["a.fbx", "", "a.fbx cannot be read as FBX"],
     ["a.fbx", "; FBX 6.1.0 project file\nFBXVersion: 6100\n", "a.fbx cannot be read as FBX"],
     ["a.dae", "<COLLADA", "a.dae cannot be read as COLLADA: unclosed xml tag(s): COLLADA."],
-    ["a.dae", '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"></COLLADA>', "a.dae"],
+    [
+      "a.dae",
+      '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"></COLLADA>',
+      "a.dae cannot be read as COLLADA: parts of it are missing or damaged.",
+    ],
     ["a.3mf", "PK", "a.3mf cannot be read as 3MF"],
     ["a.3mf", Buffer.from(make3mf(501e6)), "a.3mf cannot be read as 3MF: unpacked it has 501"],
     ["a.fbx", makeBinaryFbx(7400, 63e6), "a.fbx cannot be read as FBX: unpacked it has 50"],
