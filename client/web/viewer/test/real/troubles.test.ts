@@ -1,6 +1,7 @@
 import { join } from "node:path";
 import { afterEach, describe, expect, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
+import { make3mf, makeDae, makeFbx } from "../made_foreign.js";
 import { User } from "./user.js";
 
 const files = join(import.meta.dirname, "../../dist");
@@ -176,6 +177,16 @@ describe("the page's policy", () => {
     await page.getByRole("menuitem", { name: "Picture as PNG" }).click();
     await download;
     expect(await page.locator(".stops .stop").nth(1).getAttribute("style")).toContain("--share");
+    const asked: string[] = [];
+    page.on("request", (request) => asked.push(request.url()));
+    for (const [name, content] of Object.entries({ "a.fbx": makeFbx(), "a.dae": makeDae(), "a.3mf": make3mf() })) {
+      const chooser = page.waitForEvent("filechooser");
+      await page.getByRole("button", { name: "Open" }).click();
+      await (await chooser).setFiles([{ name, mimeType: "application/octet-stream", buffer: Buffer.from(content) }]);
+      await page.locator(".notice", { hasText: `${name} is opened as a.glb.` }).waitFor();
+    }
+    expect(asked.join()).toMatch(/foreign_worker/);
+    expect(asked.join()).not.toMatch(/foreign_glb/); // the page itself reads none
     expect(said).toEqual([]);
 
     const framing = await context.newPage();
