@@ -1,6 +1,9 @@
 import { execFileSync } from "node:child_process";
-import { readFileSync } from "node:fs";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
+import { checkPackage, createPackageFromTarballData, type Problem } from "@arethetypeswrong/core";
+import { publint } from "publint";
 import { build, type Rollup } from "vite";
 import { expect, test } from "vitest";
 
@@ -81,4 +84,28 @@ test("the decompressor is loaded by those alone who ask for it", async () => {
   expect(chunks.length).toBeGreaterThan(1);
   expect(withDecoder).toBeGreaterThan(0);
   expect(chunks[0]).toContain("grpc");
+});
+
+test("tools that look at packages as Node, bundlers and TypeScript do find no fault; it is for ESM alone", async () => {
+  const folderOfTarball = mkdtempSync(join(tmpdir(), "lpdeform-package-"));
+  try {
+    const made = execFileSync("npm", ["pack", "--json", "--pack-destination", folderOfTarball], {
+      cwd: folder,
+      encoding: "utf8",
+    });
+    const [{ filename }] = JSON.parse(made) as [{ filename: string }];
+    const tarball = new Uint8Array(readFileSync(join(folderOfTarball, filename)));
+    const { messages } = await publint({ pack: { tarball: tarball.buffer }, strict: true });
+    expect(messages).toEqual([]);
+    const entrypoints = [".", "./mesh", "./mesh/derived", "./mesh/mesh", "./mesh/read"];
+    const checked = await checkPackage(createPackageFromTarballData(tarball), { entrypoints });
+    if (!checked.types) throw new Error("the package has no types");
+    expect(Object.keys(checked.entrypoints)).toEqual(entrypoints);
+    // Resolution before Node 12.7 knows no `exports`, and CommonJS takes ESM by `import()`.
+    const elsewhere = ["node10", "node16-cjs"];
+    const kindOf = (problem: Problem) => ("resolutionKind" in problem ? problem.resolutionKind : "");
+    expect(checked.problems.filter((problem) => !elsewhere.includes(kindOf(problem)))).toEqual([]);
+  } finally {
+    rmSync(folderOfTarball, { recursive: true });
+  }
 });

@@ -5,21 +5,28 @@ import { strToU8, zipSync } from "three/addons/libs/fflate.module.js";
 // is at the origin.
 
 export const [rows, columns] = [16, 12];
-const points = Array.from({ length: (rows + 1) * columns }, (_, k) => {
-  const angle = (2 * Math.PI * (k % columns)) / columns;
-  return [Math.cos(angle), Math.sin(angle), (8 * Math.floor(k / columns)) / rows];
-});
-const triangles = Array.from({ length: rows * columns }, (_, k) => {
-  const row = Math.floor(k / columns) * columns;
-  const [a, b] = [row + (k % columns), row + ((k + 1) % columns)];
-  return [
-    [a, b, b + columns],
-    [a, b + columns, a + columns],
-  ];
-}).flat();
+
+/** `rows` of faces, and one more of vertices. */
+export function tubeOf(rows: number, columns: number) {
+  const points = Array.from({ length: (rows + 1) * columns }, (_, k) => {
+    const angle = (2 * Math.PI * (k % columns)) / columns;
+    return [Math.cos(angle), Math.sin(angle), (8 * Math.floor(k / columns)) / rows];
+  });
+  const triangles = Array.from({ length: rows * columns }, (_, k) => {
+    const row = Math.floor(k / columns) * columns;
+    const [a, b] = [row + (k % columns), row + ((k + 1) % columns)];
+    return [
+      [a, b, b + columns],
+      [a, b + columns, a + columns],
+    ];
+  }).flat();
+  return { points, triangles };
+}
+
+const small = tubeOf(rows, columns);
 
 /** COLLADA with z up, a colour, and a texture at an address on the net. */
-export function makeDae(): string {
+export function makeDae({ points, triangles } = small): string {
   return `<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
   <asset><unit name="meter" meter="1"/><up_axis>Z_UP</up_axis></asset>
@@ -50,7 +57,7 @@ export function makeDae(): string {
 }
 
 /** FBX 7.4 as text, with y up: z of the tube is y of the file. */
-export function makeFbx(): string {
+export function makeFbx({ points, triangles } = small): string {
   const places = points.flatMap(([x, y, z]) => [x, z, -y!]);
   const corners = triangles.flatMap(([a, b, c]) => [a, b, -c! - 1]); // the last corner of each face is turned about
   return `; FBX 7.4.0 project file
@@ -89,8 +96,8 @@ Connections:  {
 `;
 }
 
-/** A binary FBX of this version without a mesh: a node with a few properties, and in it one with `count` packed truths. */
-export function makeBinaryFbx(version: number, count: number): Buffer {
+/** A binary FBX of this version without a mesh: a node with a few properties, and in it one for each of `counts`, of packed truths. */
+export function makeBinaryFbx(version: number, ...counts: number[]): Buffer {
   const number = (value: number) => Buffer.from(Uint32Array.of(value).buffer);
   const field = (value: number) => (version >= 7500 ? Buffer.from(BigUint64Array.of(BigInt(value)).buffer) : number(value));
   const node = (name: string, count: number, properties: Buffer) =>
@@ -102,18 +109,21 @@ export function makeBinaryFbx(version: number, count: number): Buffer {
       Buffer.from(name),
       properties,
     ]);
-  const packed = deflateSync(new Uint8Array(count));
+  const truths = (count: number) => {
+    const packed = deflateSync(new Uint8Array(count));
+    return Buffer.concat([Buffer.from("b"), number(count), number(1), number(packed.length), packed]);
+  };
   return Buffer.concat([
     Buffer.from("Kaydara FBX Binary  \0\x1a\0"),
     number(version),
     node("Objects", 4, Buffer.concat([Buffer.from("S"), number(3), Buffer.from("abcC\x01D12345678R"), number(0)])),
-    node("Truths", 1, Buffer.concat([Buffer.from("b"), number(count), number(1), number(packed.length), packed])),
+    ...counts.map((count) => node("Truths", 1, truths(count))),
     Buffer.alloc(300),
   ]);
 }
 
 /** 3MF, which is a ZIP file. `padding`: bytes of zeros beside. */
-export function make3mf(padding = 0): Uint8Array {
+export function make3mf(padding = 0, { points, triangles } = small): Uint8Array {
   const model = `<?xml version="1.0" encoding="UTF-8"?>
 <model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>
   <object id="1" type="model" name="pipe"><mesh>

@@ -63,13 +63,13 @@ it.each(["map_Kd", "map_Kd -s", "map_Kd -o 1 2", "Kd", "Kd 1 -1 x", "newmtl", "m
   },
 );
 
-it("the files are kept with the mesh, and the OBJ that is saved is as it was", () => {
+it("the files are kept with the mesh, and the OBJ that is saved is as it was", async () => {
   const encoded = new TextEncoder().encode(mtl);
   const mesh = parseMesh("a.obj", bytes, new Map([["a.mtl", encoded]]));
   expect(Object.keys(mesh.materials!)).toEqual(["a.mtl"]);
   expect(parseMesh("a.obj", bytes, new Map([["a.png", encoded]])).materials).toBeUndefined();
   expect(rewriteObj({ ...mesh, obj: mesh.obj! }, mesh.positions)).toBe(obj);
-  expect(storedMesh(mesh).arrays).toEqual({ obj: bytes });
+  expect((await storedMesh(mesh)).arrays).toEqual({ obj: bytes, "materials/a.mtl": encoded });
 });
 
 it("materials come from the MTL files that the OBJ names, and from the others only if none of those is there", async () => {
@@ -101,4 +101,14 @@ it("a material may change at every face, and the page goes on while it is read",
   clearInterval(turning);
   expect(layers).toHaveLength(count);
   expect(turns).toBeGreaterThan(5); // something else had its turn in between
+});
+
+it("the page goes on while a long MTL is read", async () => {
+  const long = Array.from({ length: 30_000 }, (_, k) => `newmtl m${k}\nKd 1 0 0\nmap_Kd ${k}.png`).join("\n");
+  let turns = 0;
+  const turning = setInterval(() => ++turns);
+  const files = [new File([long], "a.mtl"), new File([], "29999.png"), new File([], "photo.png")];
+  expect((await materialFiles(files)).map(({ name }) => name)).toEqual(["a.mtl", "29999.png"]);
+  clearInterval(turning);
+  expect(turns).toBeGreaterThan(5);
 });

@@ -109,6 +109,24 @@ describe("a project", () => {
     }
   });
 
+  it("has the MTL and the images that were opened with an OBJ", async () => {
+    const files = { "b.mtl": "newmtl a\n", "Old Wood.png": "\x89PNG" };
+    const beside = new Map(Object.entries(files).map(([name, text]) => [name, new TextEncoder().encode(text)]));
+    const mesh = parseMesh("b.obj", new TextEncoder().encode(writeObj(shape.mesh)), beside);
+    const again = (await read(await writeProject({ ...project, mesh, document: shape.document }))).mesh;
+    const texts = Object.entries(again.materials!).map(async ([name, file]) => [name, await file.text()] as const);
+    expect(Object.fromEntries(await Promise.all(texts))).toEqual(files);
+    expect({ ...again, materials: undefined }).toEqual({ ...mesh, materials: undefined });
+  });
+
+  it("of more than it may hold is not written, and that is said", async () => {
+    const huge = { arrayBuffer: async () => new ArrayBuffer(500e6) } as Blob;
+    const materials = { "b.mtl": new Blob([]), "huge.png": huge };
+    const obj = new TextEncoder().encode(writeObj(shape.mesh));
+    const mesh = { ...parseMesh("b.obj", obj), materials };
+    await expect(writeProject({ ...project, mesh })).rejects.toThrow("The project would hold more than 500 MB.");
+  });
+
   it("may be without handles, and selects nothing that is not there", async () => {
     const document = { ...project.document, handles: [] };
     const again = await read(await writeProject({ ...project, document }));

@@ -1,4 +1,5 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
+import { LpdeformError } from "lpdeform-client";
 import { Pulse } from "../src/link/pulse.js";
 import { State } from "../src/model/state.js";
 
@@ -32,6 +33,21 @@ describe("a watcher", () => {
     );
     state.set({ pointer: 1 });
     expect(told).toEqual([0, 2]);
+  });
+
+  it("is told nothing any more, and let go, when its signal aborts", () => {
+    const state = new State(values);
+    const over = new AbortController();
+    const told: number[] = [];
+    state.watch(
+      ({ pointer }) => [pointer],
+      ([pointer]) => told.push(pointer),
+      over.signal,
+    );
+    state.set({ pointer: 1 });
+    over.abort();
+    state.set({ pointer: 2 });
+    expect(told).toEqual([0, 1]);
   });
 
   it("of everything is told of each change", () => {
@@ -121,7 +137,8 @@ describe("the pulse", () => {
   });
 
   it("takes a refusal for an answer, and asks nothing once it is stopped", async () => {
-    const ask = vi.fn<() => Promise<void>>(() => Promise.reject(new Error("no")));
+    const refusal = new LpdeformError("not_found", "no", { reason: "SESSION_UNKNOWN" });
+    const ask = vi.fn<() => Promise<void>>(() => Promise.reject(refusal));
     const changed = vi.fn();
     const pulse = new Pulse(ask, changed);
     pulse.start();
@@ -132,5 +149,21 @@ describe("the pulse", () => {
     await after(3000);
     expect(ask).toHaveBeenCalledTimes(length);
     expect(changed).not.toHaveBeenCalled();
+  });
+
+  it("stays silent while a proxy answers for a server that it does not reach", async () => {
+    let isReached = false;
+    const told: boolean[] = [];
+    const pulse: Pulse = new Pulse(
+      () => (isReached ? Promise.resolve() : Promise.reject(new LpdeformError("unavailable", "no healthy upstream"))),
+      () => told.push(pulse.isSilent),
+    );
+    pulse.start();
+    await after(3000);
+    expect(told).toEqual([true]);
+    isReached = true;
+    await after(1000);
+    expect(told).toEqual([true, false]);
+    pulse.stop();
   });
 });

@@ -158,5 +158,6 @@ async function end(child: ChildProcess | undefined, signal: NodeJS.Signals): Pro
   if (!child || child.exitCode !== null || child.signalCode !== null) return;
   const ended = new Promise((resolve) => child.once("exit", resolve));
   child.kill(signal);
+  child.kill("SIGCONT"); // one that was paused ends only then
   await ended;
 }

@@ -248,12 +248,12 @@ export class App implements Workbench {
   }
 
   /**
-   * What the user would miss, first what a reload must show: the present work if it was changed, and work that was set aside. A
-   * mesh that was only opened counts if there is no other work.
+   * What the user would miss, first what a reload must show: the present work if it was changed or its mesh is from a file, and
+   * work that was set aside.
    */
   get worthKeeping(): readonly Kept[] {
     const { wanted } = this.#asides;
-    const isMissed = this.isTouched || (wanted.length === 0 && this.view.now.shape === "");
+    const isMissed = this.isTouched || this.view.now.shape === "";
     return isMissed ? [this.#present(), ...wanted] : wanted;
   }
 
@@ -412,6 +412,11 @@ export class App implements Workbench {
   #showBetter(): void {
     const better = this.panes.map(({ live }) => live?.better?.savedShare).filter((share) => share !== undefined);
     if (!isAlike(better, this.facts.now.better)) this.facts.set({ better });
+  }
+
+  /** After a failure at which the page has stopped trying. */
+  tryAgain(): void {
+    for (const { live } of this.panes) live?.tryAgain();
   }
 
   /** In every pane. */

@@ -21,7 +21,7 @@ import { openProject, saveProject } from "./projects.js";
 const solveMs = 60_000;
 /** Limit of a file's size: browsers cannot hold longer texts. */
 const mostBytes = 500e6;
-/** Of an FBX, COLLADA or 3MF file: the page stands still while it is read. */
+/** Of an FBX, COLLADA or 3MF file. */
 const mostForeignBytes = 100e6;
 /** Above this size, reading a file takes so long that the user is told. */
 const largeBytes = 2e6;
@@ -165,9 +165,14 @@ export class Files {
     });
   }
 
-  /** Everything that is needed to go on: mesh, handles, fields, settings and camera. */
+  /** Everything that is needed to go on: mesh with its images, handles, fields, settings and camera. */
   async saveProject(): Promise<void> {
-    save(`${this.#stem}.lpdeform`, await saveProject(this.app));
+    const name = `${this.#stem}.lpdeform`;
+    try {
+      save(name, await saveProject(this.app));
+    } catch (thrown) {
+      this.app.notify(`${name} was not saved. ${sentence((thrown as Error).message)}`, true);
+    }
   }
 
   async #openProject(file: File): Promise<boolean> {

@@ -37,6 +37,9 @@ export class Keeper {
   /** Whether the tab's work is still the one that was put off. */
   #hasPutOff = false;
   #timer: ReturnType<typeof setTimeout> | undefined;
+  #isSaving = false;
+  /** Counts what was begun to be saved. */
+  #saves = 0;
   #camera = "";
 
   /**
@@ -75,9 +78,10 @@ export class Keeper {
     app.facts.watch(
       ({ document, mesh, setAside }) => [document, mesh, setAside],
       ([document, mesh, setAside], before) => {
-        if (mesh !== before[1]) this.isKeeping = false;
-        if (document !== before[0] && mesh === before[1]) app.facts.set({ restoredFrom: undefined });
-        if (document !== before[0] || mesh !== before[1] || setAside !== before[2]) this.#soon();
+        const isNew = mesh !== before[1];
+        if (isNew) this.isKeeping = false;
+        if (document !== before[0] && !isNew) app.facts.set({ restoredFrom: undefined });
+        if (document !== before[0] || isNew || setAside !== before[2]) this.#soon(isNew ? 0 : saveEveryMs);
       },
     );
     app.view.watchAll(() => this.#soon());
@@ -86,9 +90,12 @@ export class Keeper {
       if (camera !== this.#camera) this.#soon();
       this.#camera = camera;
     });
-    const now = (isLeaving: boolean) => this.#timer !== undefined && void this.#save(isLeaving);
-    window.addEventListener("pagehide", () => now(true));
-    document.addEventListener("visibilitychange", () => now(false));
+    window.addEventListener("pagehide", () => {
+      if (this.#timer !== undefined || this.#isSaving) void this.#save(true);
+    });
+    document.addEventListener("visibilitychange", () => {
+      if (this.#timer !== undefined) void this.#save();
+    });
   }
 
   /** The work of this tab, of this tab before the reload, or of a closed tab. */
@@ -172,14 +179,19 @@ export class Keeper {
     window.addEventListener("pagehide", over);
   }
 
-  #soon(): void {
-    this.#timer ??= setTimeout(() => void this.#save(), saveEveryMs);
+  #soon(pauseMs = saveEveryMs): void {
+    if (pauseMs === 0) clearTimeout(this.#timer);
+    else if (this.#timer !== undefined) return;
+    this.#timer = setTimeout(() => void this.#save(), pauseMs);
   }
 
-  /** `isLeaving`: there is no time for a worker's answer. */
+  /** `isLeaving`: there is no time for a worker's answer, nor for a save under way. */
   async #save(isLeaving = false): Promise<void> {
     clearTimeout(this.#timer);
     this.#timer = undefined;
+    if (this.#isSaving && !isLeaving) return this.#soon();
+    this.#isSaving = true;
+    const number = ++this.#saves;
     const { isDark: _, hasSingleKeys: __, ...view }: View = this.app.view.now;
     const works = this.app.worthKeeping;
     const keys = new Map(works.map(({ mesh }) => [mesh, this.#kept.get(mesh) ?? `${this.#id}/${newId()}`]));
@@ -202,6 +214,7 @@ export class Keeper {
         const newMeshes = isLeaving
           ? isNew
           : await Promise.all(isNew.map(async ([mesh, key]) => [await storedOf(mesh), key] as const));
+        if (number !== this.#saves) return; // the page was left meanwhile, with what is newest
         await this.#store!.put({ ...work, view: { ...view, ...kept.view }, asides: asides.map(withoutMesh) }, newMeshes);
         if (this.#hasPutOff) {
           sessionStorage.setItem(key, this.#id);
@@ -215,6 +228,8 @@ export class Keeper {
     } catch {
       this.isKeeping = false;
       this.#kept.clear(); // full, or forbidden: the page asks before it is left
+    } finally {
+      if (number === this.#saves) this.#isSaving = false;
     }
   }
 }

@@ -26,6 +26,7 @@ export class Readout {
     work.view.watch(
       ({ hasReadout }) => [hasReadout],
       ([isOn]) => isOn || this.hide(),
+      pane.over.signal,
     );
   }
 

@@ -1,102 +1,36 @@
-import { LoadingManager, type Material, Mesh, MeshStandardMaterial, type MeshPhongMaterial, type Object3D } from "three";
 import { FileFault } from "lpdeform-client/mesh/fault";
-import { checkUnpackedFbx, checkUnpackedZip } from "./unpacked.js";
-
-// FBX, COLLADA and 3MF, as three.js reads them. They become a GLB, which is opened as any other, with names, colours, texture
-// coordinates, skins and morph targets. Textures and animations are left out. Nothing that a file names is loaded from anywhere.
-
-const kinds = { fbx: "FBX", dae: "COLLADA", "3mf": "3MF" } as const;
-type Kind = keyof typeof kinds;
+import type { Converted } from "./foreign_glb.js";
+import type { Reply } from "./foreign_worker.js";
 
 /**
- * The file as a GLB, and what it had that is left out, in words. Needs the page's XML, which workers do not have. The reader of
- * three.js is loaded with the first such file. Rejects with a FileFault.
+ * An FBX, COLLADA or 3MF file as a GLB, and what it had that is left out, in words; see foreign_glb.ts. A worker reads it, and where
+ * there can be none the page. Rejects with a FileFault.
  */
 export async function glbOf(file: File): Promise<{ glb: File; left: readonly string[] }> {
-  const { name } = file;
-  const kind = name.toLowerCase().split(".").at(-1) as Kind;
-  const bytes = new Uint8Array(await file.arrayBuffer());
-  try {
-    const scene = await quietly(() => readers[kind](bytes));
-    if (!hasTriangles(scene)) throw new FileFault(`${name} has no triangles.`);
-    const left = simplify(scene);
-    const { GLTFExporter } = await import("three/addons/exporters/GLTFExporter.js");
-    const glb = await quietly(() => new GLTFExporter().parseAsync(scene, { binary: true, onlyVisible: false }));
-    return { glb: new File([glb as ArrayBuffer], name.replace(/\.[^.]*$/, ".glb")), left };
-  } catch (error) {
-    if (error instanceof FileFault) throw error;
-    throw new FileFault(`${name} cannot be read as ${kinds[kind]}: ${(error as Error).message || "it ends too soon"}.`);
-  }
+  const { glb, left } = (await byWorker(file)) ?? (await (await import("./foreign_glb.js")).glbIn(file));
+  return { glb: new File([glb], file.name.replace(/\.[^.]*$/, ".glb")), left };
 }
 
-const readers: Record<Kind, (bytes: Uint8Array<ArrayBuffer>) => Promise<Object3D>> = {
-  async fbx(bytes) {
-    await checkUnpackedFbx(bytes);
-    const { FBXLoader } = await import("three/addons/loaders/FBXLoader.js");
-    return new FBXLoader(nothingElse()).parse(bytes.buffer, "");
-  },
-  async dae(bytes) {
-    const { ColladaLoader } = await import("three/addons/loaders/ColladaLoader.js");
-    const read = new ColladaLoader(nothingElse()).parse(new TextDecoder().decode(bytes), "");
-    if (!read?.scene) throw new Error("its XML is broken");
-    return read.scene;
-  },
-  async "3mf"(bytes) {
-    await checkUnpackedZip(bytes);
-    const { ThreeMFLoader } = await import("three/addons/loaders/3MFLoader.js");
-    const scene = new ThreeMFLoader(nothingElse()).parse(bytes.buffer) as Object3D | null;
-    if (!scene) throw new Error("its parts are not those of a 3MF file");
-    scene.rotation.x = -Math.PI / 2; // 3MF has z up, and glTF y
-    return scene;
-  },
-};
-
-/** Every address that a file names is one without contents. */
-function nothingElse(): LoadingManager {
-  return new LoadingManager().setURLModifier(() => "data:,");
-}
-
-let readings = 0;
-let loud: Pick<Console, "warn" | "error" | "log">;
-
-/** The readers tell the console what they do not know; what they cannot read they throw, or return nothing. */
-async function quietly<Value>(read: () => Promise<Value>): Promise<Value> {
-  if (readings++ === 0) {
-    const { warn, error, log } = console;
-    loud = { warn, error, log };
-    console.warn = console.error = console.log = () => undefined;
-  }
-  try {
-    return await read();
-  } finally {
-    if (--readings === 0) Object.assign(console, loud);
-  }
-}
-
-function hasTriangles(scene: Object3D): boolean {
-  let most = 0;
-  scene.traverse((object) => {
-    if (!(object instanceof Mesh)) return;
-    const { index, attributes } = (object as Mesh).geometry;
-    most = Math.max(most, index?.count ?? attributes["position"]?.count ?? 0);
+/** Undefined if the page has to read the file itself. */
+function byWorker(file: File): Promise<Converted | undefined> {
+  return new Promise((resolve, reject) => {
+    const worker = startWorker();
+    if (!worker) return resolve(undefined);
+    const end = (settle: () => void) => {
+      worker.terminate();
+      settle();
+    };
+    worker.onmessage = ({ data }: MessageEvent<Reply>) =>
+      end(() => ("fault" in data ? reject(new FileFault(data.fault)) : resolve("glb" in data ? data : undefined)));
+    worker.onerror = worker.onmessageerror = () => end(() => resolve(undefined));
+    worker.postMessage(file);
   });
-  return most >= 3;
 }
 
-/** Leaves plain colours of the materials, and no animations. Returns what is gone. */
-function simplify(scene: Object3D): readonly string[] {
-  const left = new Set<string>();
-  const plain = (material: Material) => {
-    const { name, color, opacity, transparent, side } = material as MeshPhongMaterial;
-    if (Object.values(material).some((value) => value?.isTexture)) left.add("textures");
-    return new MeshStandardMaterial({ name, ...(color && { color }), opacity, transparent, side });
-  };
-  scene.traverse((object) => {
-    if (object.animations.length > 0) left.add("animations");
-    object.animations = [];
-    if (!(object instanceof Mesh)) return;
-    const mesh = object as Mesh;
-    mesh.material = Array.isArray(mesh.material) ? mesh.material.map(plain) : plain(mesh.material);
-  });
-  return [...left];
+function startWorker(): Worker | undefined {
+  try {
+    return new Worker(new URL("./foreign_worker.ts", import.meta.url), { type: "module" });
+  } catch {
+    return undefined;
+  }
 }

@@ -14,6 +14,9 @@ interface Material {
 /** How many lines are read before the page may do something else. */
 const linesAtOnce = 10_000;
 
+/** The page may do something else. */
+const others = () => new Promise<void>((go) => setTimeout(go));
+
 const white: Material = { colour: [1, 1, 1], image: undefined, isRepeated: true };
 
 /**
@@ -28,7 +31,7 @@ export async function readObjTextures(obj: Uint8Array, files: MaterialFiles): Pr
   let present = "";
   let lineCount = 0;
   for (const { words } of logicalLines(new TextDecoder().decode(obj))) {
-    if (++lineCount % linesAtOnce === 0) await new Promise((go) => setTimeout(go)); // the page answers in between
+    if (++lineCount % linesAtOnce === 0) await others();
     const [key, ...values] = words;
     if (key === "mtllib") for (const name of [values.join(" "), ...values]) libraries.push(name);
     if (key === "vt") coordinates.push(Number(values[0] ?? 0), 1 - Number(values[1] ?? 0));
@@ -68,7 +71,7 @@ async function materialsOf(
   const named = [...new Set(libraries.map(baseOf))].filter((name) => byName.has(name));
   const read = named.length > 0 ? named.reverse() : [...byName.keys()].filter((name) => name.endsWith(".mtl"));
   const materials = new Map<string, Material>();
-  for (const name of read) readMaterials(await byName.get(name)!.text(), materials);
+  for (const name of read) await readMaterials(await byName.get(name)!.text(), materials);
   return materials;
 }
 
@@ -78,7 +81,7 @@ export async function materialFiles(chosen: readonly File[]): Promise<File[]> {
   const isText = ({ name }: File) => /\.mtl$/i.test(name);
   for (const file of chosen.filter(isText)) {
     const materials = new Map<string, Material>();
-    readMaterials(await file.text(), materials);
+    await readMaterials(await file.text(), materials);
     for (const { image } of materials.values()) if (image !== undefined) named.add(baseOf(image));
   }
   return chosen.filter((file) => isText(file) || named.has(file.name.toLowerCase()));
@@ -88,9 +91,11 @@ function placeOf(word: string | undefined, count: number): number {
   return word ? indexOf(word, count) : -1;
 }
 
-function readMaterials(text: string, materials: Map<string, Material>): void {
+async function readMaterials(text: string, materials: Map<string, Material>): Promise<void> {
   let name: string | undefined;
+  let lineCount = 0;
   for (const { words } of logicalLines(text)) {
+    if (++lineCount % linesAtOnce === 0) await others();
     const [key, ...values] = words;
     if (key === "newmtl") materials.set((name = values.join(" ")), white);
     const material = name === undefined ? undefined : materials.get(name);

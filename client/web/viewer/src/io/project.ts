@@ -68,9 +68,12 @@ const viewChecks: { readonly [K in keyof ProjectView]: (value: unknown) => boole
 };
 const viewKeys = Object.keys(viewChecks) as (keyof ProjectView)[];
 
-/** A gzip file of one line of JSON and arrays; the line's "handles" is a handle file of the command line. */
+/**
+ * A gzip file of one line of JSON and arrays; the line's "handles" is a handle file of the command line. Rejects with a FileFault if
+ * it would hold more than readProject() reads.
+ */
 export async function writeProject({ mesh, document, view, look }: Project): Promise<Uint8Array<ArrayBuffer>> {
-  const { head, arrays } = storedMesh(mesh);
+  const { head, arrays } = await storedMesh(mesh);
   const { p, secondP, isAutomatic, handles, keyPoses } = document;
   const all = {
     format,
@@ -85,7 +88,7 @@ export async function writeProject({ mesh, document, view, look }: Project): Pro
     view: Object.fromEntries(viewKeys.map((key) => [key, view[key]])),
     camera: look,
   };
-  return gzip(joinSections(all, arrays));
+  return gzip(joinSections(all, arrays, mostBytes));
 }
 
 /** Reads what writeProject() wrote. Rejects with a FileFault that names `file` and what is wrong. */

@@ -6,7 +6,7 @@ import { readObj } from "lpdeform-client/mesh/obj";
 import { isObject, type Sections } from "./sections.js";
 
 /** Where each part of a mesh goes in a project. One that is missing does not compile. */
-const parts: { readonly [K in keyof Required<Mesh>]: "head" | "array" | "source" | "left" } = {
+const parts: { readonly [K in keyof Required<Mesh>]: "head" | "array" | "source" | "files" } = {
   name: "head",
   positions: "array",
   exact: "array",
@@ -14,7 +14,7 @@ const parts: { readonly [K in keyof Required<Mesh>]: "head" | "array" | "source"
   corners: "array",
   beside: "head",
   obj: "source",
-  materials: "left",
+  materials: "files",
   gltf: "source",
 };
 
@@ -23,11 +23,21 @@ interface Stored {
   arrays: Sections;
 }
 
-/** The file that the mesh came from, if the mesh has it, or otherwise its arrays. */
-export function storedMesh(mesh: Mesh): Stored {
-  const { name, beside = [], exact, positions, faces, corners } = mesh;
+/** Comes before the names of files that were opened with an OBJ. */
+const filePrefix = "materials/";
+
+/**
+ * The file that the mesh came from and those that were opened with it, if the mesh has them, or otherwise its arrays. Rejects if the
+ * browser no longer has a file.
+ */
+export async function storedMesh(mesh: Mesh): Promise<Stored> {
+  const { name, beside = [], exact, positions, faces, corners, materials = {} } = mesh;
   const source = (Object.keys(parts) as (keyof Mesh)[]).find((part) => parts[part] === "source" && mesh[part]);
-  if (source) return { head: { name, source }, arrays: { [source]: mesh[source] as Uint8Array } };
+  if (source) {
+    const read = async ([file, blob]: [string, Blob]) => [filePrefix + file, new Uint8Array(await blob.arrayBuffer())] as const;
+    const files = Object.fromEntries(await Promise.all(Object.entries(materials).map(read)));
+    return { head: { name, source }, arrays: { [source]: mesh[source] as Uint8Array, ...files } };
+  }
   return {
     head: { name, beside },
     arrays: { positions: exact ?? positions, faces, ...(corners && { corners }) },
@@ -40,7 +50,7 @@ export function readStoredMesh(json: unknown, arrays: Sections, file: string): M
   if (typeof name !== "string" || name.length > 1000) throw new FileFault(`In ${file}, the mesh has no name.`);
   if (source === "obj" && arrays["obj"] instanceof Uint8Array) {
     const { obj } = arrays;
-    return { ...readObj(name, new TextDecoder().decode(obj)), obj };
+    return { ...readObj(name, new TextDecoder().decode(obj)), obj, ...materialsIn(arrays) };
   }
   if (source === "gltf" && arrays["gltf"] instanceof Uint8Array) return readGltf(name, arrays["gltf"]);
   const { positions, faces, corners } = arrays;
@@ -57,6 +67,13 @@ export function readStoredMesh(json: unknown, arrays: Sections, file: string): M
   }
   if (Array.isArray(beside)) for (const what of beside) if (typeof what === "string") builder.leftAside(what);
   return { ...builder.finish(file), name };
+}
+
+function materialsIn(arrays: Sections): Pick<Mesh, "materials"> {
+  const files = Object.entries(arrays).flatMap(([name, bytes]) =>
+    name.startsWith(filePrefix) ? [[name.slice(filePrefix.length), new Blob([bytes as BlobPart])] as const] : [],
+  );
+  return files.length > 0 ? { materials: Object.fromEntries(files) } : {};
 }
 
 function cornersOf(corners: Sections[string], faces: Uint32Array, file: string): Uint32Array {

@@ -8,11 +8,15 @@ export type Numbers = Uint8Array | Uint32Array | Float32Array | Float64Array;
 /** Arrays by their names. */
 export type Sections = Readonly<Record<string, Numbers>>;
 
-/** One line of JSON, and after it the arrays, which the line lists as its "sections". Numbers are little-endian. */
-export function joinSections(head: object, arrays: Sections): Uint8Array<ArrayBuffer> {
+/**
+ * One line of JSON, and after it the arrays, which the line lists as its "sections". Numbers are little-endian. Throws a FileFault if
+ * that is more than `mostBytes`.
+ */
+export function joinSections(head: object, arrays: Sections, mostBytes: number): Uint8Array<ArrayBuffer> {
   const sections = Object.entries(arrays).map(([name, array]) => ({ name, kind: kindOf(array), length: array.length }));
   const line = new TextEncoder().encode(`${JSON.stringify({ ...head, sections })}\n`);
   const size = Object.values(arrays).reduce((sum, { byteLength }) => sum + byteLength, line.length);
+  if (size > mostBytes) throw new FileFault(`The project would hold more than ${mostBytes / 1e6} MB.`);
   const all = new Uint8Array(size);
   all.set(line);
   let at = line.length;

@@ -7,8 +7,12 @@ function check(size: number): void {
   if (size > mostBytes) throw new Error(`unpacked it has ${size} bytes or more, and this page takes ${mostBytes}`);
 }
 
-/** The reader of three.js gives each part of a ZIP file the room that it claims, and no more. */
 export async function checkUnpackedZip(bytes: Uint8Array<ArrayBuffer>): Promise<void> {
+  check(await unpackedZipBytes(bytes));
+}
+
+/** As it claims: the reader of three.js gives each part of a ZIP file that room, and no more. */
+export async function unpackedZipBytes(bytes: Uint8Array<ArrayBuffer>): Promise<number> {
   const { unzipSync } = await import("three/addons/libs/fflate.module.js");
   let size = 0;
   const measure = ({ originalSize }: { originalSize: number }) => {
@@ -16,7 +20,7 @@ export async function checkUnpackedZip(bytes: Uint8Array<ArrayBuffer>): Promise<
     return false;
   };
   unzipSync(bytes, { filter: measure });
-  check(size);
+  return size;
 }
 
 const widths: Record<string, number> = { C: 1, Y: 2, I: 4, F: 4, D: 8, L: 8 };

@@ -18,7 +18,7 @@ import type { Document } from "../model/document.js";
 import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { Meter } from "./meter.js";
 import { Pulse } from "./pulse.js";
-import { isPassing, notAnswering, say, type Status, statusAtEnd, statusOf } from "./status.js";
+import { failingHere, isPassing, notAnswering, say, type Status, statusAtEnd, statusOf } from "./status.js";
 import { watchedStatus } from "./watched.js";
 
 export interface LiveWatcher {
@@ -35,6 +35,9 @@ export interface LiveWatcher {
 }
 
 const live = say("live", "Live");
+/** How often in a row the page itself may fail with frames before it stops trying; a session of this length ends the row. */
+const mostFailures = 8;
+const steadyMs = 30_000;
 /** Frames answer one of the newest inputs, so no more are needed. */
 const mostExponents = 100;
 const mostSent = 1000;
@@ -64,6 +67,7 @@ export class Live {
   #sent: { seq: number; document: Document }[] = [];
   /** For sessions that cannot be opened or break at once: by the client's rules, in addition to what the server asks for. */
   readonly #backoff = new Backoff();
+  #failures = 0;
   readonly #over = new AbortController();
   readonly #pulse: Pulse;
 
@@ -220,12 +224,19 @@ export class Live {
       session.on("notice", (notice) => this.#say(notice));
       this.#tell(performance.now());
       const openedAt = performance.now();
-      const { hadFrames, askedMs } = await this.#readFrames(session);
-      if (this.#over.signal.aborted || !isPassing(this.status)) return;
+      const { hadFrames, error } = await this.#readFrames(session);
+      if (this.#over.signal.aborted) return;
       // A server that opens sessions but gives no frames, or breaks at once, must not be sent the mesh again
-      // and again.
-      if (hadFrames && performance.now() - openedAt >= Backoff.mostMs) this.#backoff.reset();
-      await pause(this.#backoff.nextMs(askedMs), this.#over.signal);
+      // and again, nor may one whose frames this page fails with.
+      const isOwnFault = error?.reason === "EXCEPTION";
+      if (hadFrames && performance.now() - openedAt >= (isOwnFault ? steadyMs : Backoff.mostMs)) {
+        this.#backoff.reset();
+        this.#failures = 0;
+      }
+      if (isOwnFault) ++this.#failures;
+      if (error) this.#end(session, error);
+      if (!isPassing(this.status)) return;
+      await pause(this.#backoff.nextMs(error?.retryAfterMs), this.#over.signal);
     }
   }
 
@@ -260,11 +271,9 @@ export class Live {
     }
   }
 
-  /**
-   * Reads frames until the session ends. Returns whether there were any, and the pause that the server asked for at the end.
-   */
-  async #readFrames(session: Session): Promise<{ hadFrames: boolean; askedMs: number }> {
-    let [hadFrames, askedMs] = [false, 0];
+  /** Reads frames until the session ends. */
+  async #readFrames(session: Session): Promise<{ hadFrames: boolean; error?: LpdeformError }> {
+    let hadFrames = false;
     try {
       for await (const frame of session) {
         if (this.#over.signal.aborted) break;
@@ -276,14 +285,25 @@ export class Live {
         await taken;
       }
     } catch (thrown) {
-      const error = thrown instanceof LpdeformError ? thrown : brokenHere(thrown);
-      askedMs = error.retryAfterMs;
-      if (this.#over.signal.aborted) return { hadFrames, askedMs };
-      this.#setStatus(this.watched ? watchedStatus(error, statusAtEnd(error)) : statusAtEnd(error));
-      void session.close().catch(() => undefined);
-      this.#session = undefined;
+      return { hadFrames, error: thrown instanceof LpdeformError ? thrown : brokenHere(thrown) };
     }
-    return { hadFrames, askedMs };
+    return { hadFrames };
+  }
+
+  #end(session: Session, error: LpdeformError): void {
+    const atEnd = this.#failures < mostFailures ? statusAtEnd(error) : failingHere(error);
+    this.#setStatus(this.watched && !atEnd.canTryAgain ? watchedStatus(error, atEnd) : atEnd);
+    void session.close().catch(() => undefined);
+    this.#session = undefined;
+  }
+
+  /** Only if the status says that it can. */
+  tryAgain(): void {
+    if (!this.status.canTryAgain) return;
+    this.#failures = 0;
+    this.#backoff.reset();
+    this.#setStatus(say("opening", "Preparing…"));
+    void this.#run();
   }
 
   #tell(time: number): void {

@@ -1,3 +1,5 @@
+import type { LpdeformError } from "lpdeform-client";
+
 const beatMs = 100;
 /** How long after the last answer the next question comes, and how long its answer may take. */
 const restMs = 400;
@@ -21,8 +23,8 @@ export class Pulse {
   #run = 0;
 
   /**
-   * `ask`: resolves with the answer. A server that rejects has answered, too, or is gone, which the stream tells. `changed`:
-   * isSilent has changed while the pulse was running.
+   * `ask`: resolves with the answer, or rejects with an LpdeformError. A server that refuses has answered, too. `changed`: isSilent
+   * has changed while the pulse was running.
    */
   constructor(
     readonly ask: () => Promise<void>,
@@ -58,13 +60,16 @@ export class Pulse {
     this.#isAsking = true;
     this.#waited = 0;
     const run = this.#run;
-    const done = () => {
+    const done = (isSilent: boolean) => {
       if (run !== this.#run) return;
       this.#isAsking = false;
       this.#waited = 0;
-      this.#set(false);
+      this.#set(isSilent);
     };
-    this.ask().then(done, done);
+    this.ask().then(
+      () => done(false),
+      (error: LpdeformError) => done(isUnanswered(error)),
+    );
   }
 
   #set(isSilent: boolean): void {
@@ -72,4 +77,9 @@ export class Pulse {
     this.isSilent = isSilent;
     this.changed();
   }
+}
+
+/** Whether a proxy speaks for a server that it does not reach: servers give a reason. */
+function isUnanswered({ code, reason }: LpdeformError): boolean {
+  return code === "unavailable" && reason === "";
 }

@@ -9,6 +9,8 @@ export interface Status {
   text: string;
   /** The element that the server named: "vertex 17", "face 3". */
   element: string;
+  /** Nothing is tried any more until the user wants it. */
+  canTryAgain?: boolean;
 }
 
 const kept = "Your work is kept here";
@@ -49,6 +51,11 @@ export function statusAtEnd(error: LpdeformError): Status {
   if (error.reason !== "FRAME_PARTS" && error.reason !== "FRAME_VERTICES") return statusOf(error);
   const advice = "Page and server may be of different versions: reload the page.";
   return say("refused", "The server's frames do not fit this mesh", `${advice} ${kept}.`);
+}
+
+/** The page has failed with the frames of session after session. */
+export function failingHere({ message }: LpdeformError): Status {
+  return { ...say("refused", "This page fails with every frame", sentence(message)), canTryAgain: true };
 }
 
 function isSessionOver(reason: string): boolean {

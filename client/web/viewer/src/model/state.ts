@@ -21,20 +21,23 @@ export class State<Values extends object> {
 
   /**
    * Calls `watcher` at once, and then when a value of what `pick` returns has become another one. `before`: what was picked the
-   * time before; the first time it is what is picked now.
+   * time before; the first time it is what is picked now. Ends when `signal` aborts: what the watcher knows of is held until then.
    */
   watch<const Picked extends readonly unknown[]>(
     pick: (values: Values) => Picked,
     watcher: (picked: Picked, before: Picked) => void,
+    signal?: AbortSignal,
   ): void {
     let last = pick(this.#values);
-    this.#watchers.add(() => {
+    const look = () => {
       const before = last;
       const picked = pick(this.#values); // a watcher before this one may have changed them again
       if (picked.every((value, k) => Object.is(value, before[k]))) return;
       last = picked;
       watcher(picked, before);
-    });
+    };
+    this.#watchers.add(look);
+    signal?.addEventListener("abort", () => this.#watchers.delete(look));
     watcher(last, last);
   }
 

@@ -78,11 +78,11 @@ export function helpSheet(app: App): HTMLDialogElement {
     },
     "Letters, digits and signs: off for speech input and for whoever hits keys by mistake",
   );
-  const close = el("button", { type: "button", className: "plain", textContent: "Close", autofocus: true });
+  const close = el("button", { type: "button", className: "plain", textContent: "Close" });
   const sheet = el(
     "dialog",
     { className: "help", aria: { label: "Help" } },
-    el("h2", {}, "Deform a shape"),
+    el("h2", { tabIndex: -1, autofocus: true }, "Deform a shape"), // what can be pressed may be below what is seen
     el(
       "p",
       {},

@@ -20,20 +20,24 @@ export function messages(app: App, startOver: () => void): HTMLElement {
   const title = el("strong");
   const text = el("span");
   const show = el("button", { type: "button", className: "plain", textContent: "Show where" });
+  const again = el("button", { type: "button", className: "plain", textContent: "Try again", hidden: true });
   const banner = el(
     "div",
     { className: "banner", role: "alert", hidden: true },
     el("span", { className: "spinner" }),
     el("div", {}, title, text),
     show,
+    again,
   );
   const notice = el("div", { className: "notice", role: "status", hidden: true });
   const hint = measured(el("div", { className: "hint" }), "--hint-height");
   const restored = restoredNote(app, startOver);
+  const aside = asideNote(app);
   let element = "";
   let timer: ReturnType<typeof setTimeout> | undefined;
   let late: ReturnType<typeof setTimeout> | undefined;
   show.addEventListener("click", () => pointOutNamed(app, element));
+  again.addEventListener("click", () => app.tryAgain());
 
   const showStatus = (status: Status) => {
     pill.show(status);
@@ -46,6 +50,7 @@ export function messages(app: App, startOver: () => void): HTMLElement {
     banner.dataset["kind"] = isProblem ? "refused" : status.kind;
     const { vertices, edges, faces } = elementsIn(element, app.document.handles);
     show.hidden = vertices.length + edges.length + faces.length === 0;
+    again.hidden = !status.canTryAgain;
     banner.hidden = !isWrong && !isProblem;
   };
   const stopWaiting = () => {
@@ -58,10 +63,8 @@ export function messages(app: App, startOver: () => void): HTMLElement {
     showHint();
   };
   const showHint = () => {
-    const { restoredFrom, setAside } = app.facts.now;
     setText(hint, hintOf(app));
-    hint.hidden =
-      app.isWatching || hint.textContent === "" || !banner.hidden || restoredFrom !== undefined || setAside.length > 0;
+    hint.hidden = app.isWatching || hint.textContent === "" || !banner.hidden || app.facts.now.restoredFrom !== undefined;
   };
   app.facts.watch(
     ({ status, problem }) => [status, problem],
@@ -73,10 +76,7 @@ export function messages(app: App, startOver: () => void): HTMLElement {
       showHint();
     },
   );
-  app.facts.watch(
-    ({ document, canUndo, restoredFrom, setAside }) => [document.handles.length, canUndo, restoredFrom, setAside],
-    showHint,
-  );
+  app.facts.watch(({ document, canUndo, restoredFrom }) => [document.handles.length, canUndo, restoredFrom], showHint);
   app.facts.watch(
     ({ notice }) => [notice],
     ([now]) => {
@@ -89,7 +89,22 @@ export function messages(app: App, startOver: () => void): HTMLElement {
     },
   );
   app.view.watchAll(showHint);
-  return el("div", { className: "messages" }, pill.element, banner, restored, asideNote(app), hint, betterButton(app), notice);
+  makeWay(app, notice);
+  app.stages.addEventListener("pointerdown", () => aside.classList.add("small"), { capture: true });
+  return el("div", { className: "messages" }, pill.element, banner, hint, restored, aside, betterButton(app), notice);
+}
+
+/** Lets no notice lie over what is dragged in a picture: a press ends it, or hides it for so long if it has still to be read. */
+function makeWay(app: App, notice: HTMLElement): void {
+  const hide = (isHidden: boolean) => notice.classList.toggle("makes-way", isHidden);
+  const press = () => {
+    const { notice: now } = app.facts.now;
+    if (now && !now.isBad && !now.stays) app.facts.set({ notice: undefined });
+    hide(true);
+  };
+  // Before the picture has the event: its press may make a notice of its own.
+  app.stages.addEventListener("pointerdown", press, { capture: true });
+  for (const end of ["pointerup", "pointercancel"]) window.addEventListener(end, () => hide(false), { capture: true });
 }
 
 /** There while the server knows a shape of lower energy; takes those of all panes. */
@@ -144,10 +159,12 @@ function asideNote(app: App): HTMLElement {
     ([setAside]) => {
       const [newest] = setAside;
       note.hidden = newest === undefined;
+      note.classList.remove("small");
       which.hidden = setAside.length < 2;
       which.replaceChildren(...setAside.map(({ id, name }) => el("option", { value: String(id), textContent: name })));
       if (!newest) return;
       const one = `“${newest.name}” was set aside with your work on it.`;
+      back.title = setAside.length > 1 ? "" : one;
       setText(text, setAside.length > 1 ? `${setAside.length} were set aside with your work:` : one);
     },
   );

@@ -9,6 +9,7 @@ import { Service } from "../../../client/test/support/service.js";
 import { percentile } from "lpdeform-client/mesh/statistics";
 import { chromium, type Browser } from "playwright-core";
 import { launch } from "../real/user.js";
+import { make3mf, makeDae, makeFbx, tubeOf } from "../made_foreign.js";
 import { ringObj, ringVertex } from "../support/ring.js";
 import { args, BarePage, stir } from "../real/bare_page.js";
 import { tasksByMark, type Task, Trace } from "./trace.js";
@@ -58,13 +59,12 @@ function sayLongest(what: string, tasks: readonly Task[], trace: Trace): void {
 }
 
 const bare = (browser: Browser) => BarePage.open(browser, `${service.url}/?shape=sheet&detail=coarse`);
-const openFile = (page: BarePage, text: string) => page.openText(join(folder, "ring.obj"), text);
 
 async function opened(text: string): Promise<{ browser: Browser; page: BarePage }> {
   const browser = await chromium.launch({ ...launch, args });
   const page = await bare(browser);
   await page.settled();
-  await openFile(page, text);
+  await page.openFile(join(folder, "ring.obj"), text);
   await page.until(`window.__lpdeform.app.mesh.name === "ring.obj" && window.__lpdeform.status() === "live"`);
   return { browser, page };
 }
@@ -153,13 +153,20 @@ it(
   (10 * seconds + 120) * 1000,
 );
 
+const obj = (one: number, other: number) => ["OBJ", one * other, () => ringObj(one, other)] as const;
+const tube = () => tubeOf(across - 1, around);
+
 it.each([
-  [around, across],
-  [largeAround, largeAcross],
+  obj(around, across),
+  obj(largeAround, largeAcross),
+  ["FBX", around * across, () => makeFbx(tube())] as const,
+  ["DAE", around * across, () => makeDae(tube())] as const,
+  ["3MF", around * across, () => make3mf(0, tube())] as const,
 ])(
-  "opening an OBJ file of %d by %d",
-  async (one, other) => {
-    const text = ringObj(one, other);
+  "opening a file: %s, %d vertices",
+  async (kind, count, make) => {
+    const content = make();
+    const ending = kind.toLowerCase();
     const openings: Task[][] = [];
     const waits: number[] = [];
     for (let time = 0; time < 3; ++time) {
@@ -171,8 +178,8 @@ it.each([
       );
       const trace = await Trace.start(browser, profile);
       const begin = performance.now();
-      await openFile(page, text);
-      await page.until(`window.__lpdeform.app.mesh.name === "ring.obj"`);
+      await page.openFile(join(folder, `ring.${ending}`), content);
+      await page.until(`window.__lpdeform.app.mesh.name.startsWith("ring.")`);
       waits.push(performance.now() - begin);
       await page.until(`window.__lpdeform.status() === "live"`);
       await new Promise((again) => setTimeout(again, 1500)); // what the page keeps for later
@@ -181,7 +188,7 @@ it.each([
       sayLongest("opening", tasks, trace);
       await browser.close();
     }
-    const name = `opening ${(one * other).toLocaleString("en")} vertices`;
+    const name = `opening ${count.toLocaleString("en")} vertices, ${kind}`;
     note(name, openings);
     notes.push(`${name}: the mesh is there after ${percentile(waits, 0.5).toFixed(0)} ms.`);
   },

@@ -90,7 +90,7 @@ it.each([
   "a drag of %d times %d vertices",
   async (around, across) => {
     const { browser, page } = await opened(service, "shape=sheet&detail=coarse");
-    await page.openText(join(folder, "ring.obj"), ringObj(around, across));
+    await page.openFile(join(folder, "ring.obj"), ringObj(around, across));
     await page.until(`window.__lpdeform.app.mesh.name === "ring.obj" && window.__lpdeform.status() === "live"`);
     const onPage = (turn: number) =>
       page.ask<{ x: number; y: number }>(`vertexOnPage(${ringVertex(around, across, turn, 0.2)})`);

@@ -114,8 +114,8 @@ export class BarePage {
   }
 
   /** Written there first: a file that a test sends to the page keeps the page busy. */
-  async openText(path: string, text: string): Promise<void> {
-    writeFileSync(path, text);
+  async openFile(path: string, content: string | Uint8Array): Promise<void> {
+    writeFileSync(path, content);
     await this.#send("Page.setInterceptFileChooserDialog", { enabled: true });
     const chooser = new Promise<Record<string, unknown>>((opened) => this.#events.set("Page.fileChooserOpened", opened));
     await this.click(await this.evaluate(openButton));

@@ -55,6 +55,9 @@ it("shapes of other work are dropped, and prepared again", async () => {
   await user.page.keyboard.press("Enter");
   await user.until("document.querySelector('.blend input[type=range]').disabled");
   await status().filter({ hasText: "All shapes are ready." }).waitFor({ timeout: 60_000 });
+  await user.ask("app.view.set({ weldTolerance: 1e-4 })"); // other vertices count as one
+  await user.until("document.querySelector('.blend input[type=range]').disabled");
+  await status().filter({ hasText: "All shapes are ready." }).waitFor({ timeout: 60_000 });
   await user.page.locator("canvas.stage").focus();
   await user.page.keyboard.press("a");
   await status().filter({ hasText: "p comes from the shape" }).waitFor();

@@ -75,3 +75,11 @@ it("p is typed, within its range", async () => {
   await user.page.getByRole("checkbox", { name: "Automatic" }).setChecked(true, { force: true });
   expect(await field("Value of p of the left picture").inputValue()).toBe("auto");
 });
+
+it("five digits with a sign can be read whole", async () => {
+  await field("Moved along x").fill("-0.34304");
+  await field("Moved along x").press("Enter");
+  const widths = () =>
+    field("Moved along x").evaluate((input: HTMLInputElement) => [input.value, input.scrollWidth - input.clientWidth]);
+  expect(await widths()).toEqual(["-0.34304", 0]);
+});

@@ -34,19 +34,22 @@ afterAll(async () => {
 const notice = (words: string) => user.page.locator(".notice", { hasText: words }).first().waitFor({ timeout: 15_000 });
 
 describe("the viewer", () => {
-  it("loads the readers of other formats with the first such file, and not before", async () => {
-    const loaded = () =>
+  it("loads the readers of other formats with the first such file, and not before, in a worker", async () => {
+    const own = () =>
       user.page.evaluate(() =>
         performance
           .getEntriesByType("resource")
           .map(({ name }) => name)
           .join(),
       );
-    expect(await loaded()).not.toMatch(/foreign|FBX|Collada|3MF/);
+    const asked: string[] = [];
+    user.page.on("request", (request) => asked.push(request.url()));
+    expect(await own()).not.toMatch(/foreign|FBX|Collada|3MF/);
     await user.openFiles({ name: "tube.fbx", content: files["tube.fbx"] });
     await notice("tube.fbx is opened as tube.glb.");
-    expect(await loaded()).toMatch(/FBXLoader/);
-    expect(await loaded()).not.toMatch(/Collada|3MFLoader/);
+    expect(asked.join()).toMatch(/foreign_worker.*FBXLoader/);
+    expect(asked.join()).not.toMatch(/Collada|3MFLoader/);
+    expect(await own()).not.toMatch(/foreign_glb|FBX/);
   });
 
   it.each(["tube.dae", "tube.fbx", "tube.3mf"] as const)(
@@ -89,12 +92,17 @@ describe("the viewer", () => {
   it.each([
     ["a.fbx", "", "a.fbx cannot be read as FBX"],
     ["a.fbx", "; FBX 6.1.0 project file\nFBXVersion: 6100\n", "a.fbx cannot be read as FBX"],
-    ["a.dae", "<COLLADA", "a.dae cannot be read as COLLADA: its XML is broken"],
-    ["a.dae", '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"></COLLADA>', "a.dae"],
+    ["a.dae", "<COLLADA", "a.dae cannot be read as COLLADA: unclosed xml tag(s): COLLADA."],
+    [
+      "a.dae",
+      '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"></COLLADA>',
+      "a.dae cannot be read as COLLADA: parts of it are missing or damaged.",
+    ],
     ["a.3mf", "PK", "a.3mf cannot be read as 3MF"],
     ["a.3mf", Buffer.from(make3mf(501e6)), "a.3mf cannot be read as 3MF: unpacked it has 501"],
     ["a.fbx", makeBinaryFbx(7400, 63e6), "a.fbx cannot be read as FBX: unpacked it has 50"],
     ["a.fbx", makeBinaryFbx(7500, 63e6), "a.fbx cannot be read as FBX: unpacked it has 50"],
+    ["a.fbx", makeBinaryFbx(7400, 30e6, 33e6), "a.fbx cannot be read as FBX: unpacked it has 50"], // each is allowed by itself
   ])("refuses %s with a sentence", async (name, content, words) => {
     await user.openFiles({ name, content });
     await notice(words);
@@ -110,7 +118,14 @@ describe("hostile files", () => {
   beforeAll(async () => {
     folder = mkdtempSync(join(tmpdir(), "lpdeform-foreign-"));
     const root = join(import.meta.dirname, "foreign_page");
-    await build({ root, base: "./", logLevel: "error", configFile: false, build: { outDir: folder, target: "es2022" } });
+    await build({
+      root,
+      base: "./",
+      logLevel: "error",
+      configFile: false,
+      worker: { format: "es" },
+      build: { outDir: folder, target: "es2022" },
+    });
     bare = await Service.start({ files: folder });
     page = await (await user.browser.newContext({ bypassCSP: true })).newPage();
     await page.goto(bare.url);
@@ -132,6 +147,28 @@ describe("hostile files", () => {
       [...files["tube.dae"]],
     );
     expect(isHeard).toBe(true);
+  });
+
+  it("of 3MF are read by the page if their XML takes more than a worker has", async () => {
+    const loaded = () =>
+      page.evaluate(() => performance.getEntriesByType("resource").some(({ name }) => /3MFLoader/.test(name)));
+    expect(await page.evaluate((bytes) => window.convert("a.3mf", bytes), [...files["tube.3mf"]])).toMatch(/vertices$/);
+    expect(await loaded()).toBe(false);
+    expect(await page.evaluate((bytes) => window.convert("a.3mf", bytes), [...make3mf(32.1e6)])).toMatch(/vertices$/);
+    expect(await loaded()).toBe(true);
+  });
+
+  it("are read by the page if it can have no workers", async () => {
+    const other = await page.context().newPage();
+    await other.addInitScript("delete window.Worker");
+    await other.goto(bare.url);
+    await other.waitForFunction(() => window.convert);
+    for (const [name, content] of Object.entries(files)) {
+      expect(await other.evaluate(([name, bytes]) => window.convert(name, bytes), [name, [...content]] as const)).toMatch(
+        /vertices$/,
+      );
+    }
+    await other.close();
   });
 
   it("are read or refused by a sentence about the file, however they are damaged", async () => {

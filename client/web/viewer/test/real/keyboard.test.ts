@@ -322,6 +322,16 @@ it("the cross goes by steps and by pixels, stays on the picture, and goes away w
   await press("f");
 });
 
+it("the help begins at its beginning", async () => {
+  await user.page.setViewportSize({ width: 1280, height: 600 });
+  await press("?");
+  const help = user.page.getByRole("dialog", { name: "Help" });
+  expect(await help.evaluate((dialog) => [dialog.scrollTop, dialog.scrollHeight > dialog.clientHeight])).toEqual([0, true]);
+  await press("Escape");
+  await help.waitFor({ state: "hidden" });
+  await user.page.setViewportSize({ width: 1280, height: 800 });
+});
+
 it("shortcuts of a single key can be switched off, and stay so", async () => {
   await press("?");
   const help = user.page.getByRole("dialog", { name: "Help" });

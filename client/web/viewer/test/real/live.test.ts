@@ -45,6 +45,25 @@ it("changes the surface with p", async () => {
   expect(await user.ask("document().p")).toBe(6);
 });
 
+it("holds nothing of second pictures that were closed", async () => {
+  for (let time = 0; time < 3; ++time) {
+    await user.page.keyboard.press("s");
+    await user.settled(1);
+    await user.page.keyboard.press("s");
+    await user.settled();
+  }
+  const devtools = await user.page.context().newCDPSession(user.page);
+  const expression = "Object.getPrototypeOf(window.__lpdeform.app.panes[0].stage)";
+  const { result } = await devtools.send("Runtime.evaluate", { expression });
+  const { objects } = await devtools.send("Runtime.queryObjects", { prototypeObjectId: result.objectId! });
+  const count = await devtools.send("Runtime.callFunctionOn", {
+    functionDeclaration: "function () { return this.length; }",
+    objectId: objects.objectId!,
+  });
+  expect(count.result.value).toBe(1);
+  await devtools.detach();
+});
+
 it("offers a better shape by a button with what it saves, which goes with the next change", async () => {
   const take = user.page.getByRole("button", { name: "Take a shape with 7 % less energy" });
   await user.ask("app.facts.set({ better: [0.0714] })");

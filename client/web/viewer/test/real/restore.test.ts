@@ -133,6 +133,18 @@ it("a mesh from a file comes back, and is deleted on demand, for good", async ()
   expect(await note().isHidden()).toBe(true);
 });
 
+it("a mesh from a file comes back however soon the page is reloaded, beside work that it replaced", async () => {
+  const names = ["soon.off", "sooner.off"];
+  await bend();
+  for (const name of names) {
+    await user.openFiles({ name, content: writeOff(blockSurface(2, 2, 6, () => true)) });
+    await user.until(`window.__lpdeform.app.mesh.name === '${name}'`);
+    await reload();
+    expect(await user.ask("app.mesh.name")).toBe(name);
+  }
+  expect(await user.ask("app.facts.now.setAside.map(({ name }) => name)")).toEqual([names[0], "bar"]);
+});
+
 it("work that another shape or a file replaced, or that was discarded, is brought back", async () => {
   await bend();
   const bent = await work();
@@ -173,6 +185,23 @@ it("work that another shape or a file replaced, or that was discarded, is brough
   expect(await aside.isHidden()).toBe(true);
 });
 
+it("the note of work that was set aside makes room for whoever goes on, and what to do next is said beside it", async () => {
+  await bend();
+  await user.openFiles({ name: "tower.off", content: writeOff(blockSurface(2, 2, 6, () => true)) });
+  const aside = user.page.locator(".aside", { hasText: "“bar” was set aside with your work on it." });
+  await aside.waitFor();
+  await user.page.locator(".hint", { hasText: "Click the surface to place a first handle" }).waitFor();
+  await user.settled();
+  const { width } = (await aside.boundingBox())!;
+  const { x, y } = await user.vertexOnPage(await user.vertexNear([1, 0, 5]));
+  await user.page.mouse.click(x, y);
+  expect(await user.ask("document().handles.length")).toBe(1);
+  expect((await aside.boundingBox())!.width).toBeLessThan(0.6 * width);
+  await aside.getByRole("button", { name: "Bring it back" }).click();
+  await user.until("window.__lpdeform.app.mesh.name === 'bar'");
+  await user.page.locator(".aside", { hasText: "“tower.off” was set aside" }).getByText("was set aside").waitFor();
+});
+
 it("work that was set aside stays, however much is opened after it and left as it was, over a reload too", async () => {
   await bend();
   const bent = await work();
@@ -198,10 +227,12 @@ it("work that was set aside stays, however much is opened after it and left as i
   expect([await work(), await user.ask("app.mesh.name"), await user.ask("app.view.now.shape")]).toEqual([bent, "bar", "bar"]);
   expect(await note().textContent()).toContain("“bar” is here again");
 
-  await user.openFiles(tower); // a mesh that one has anyway is not worth more than work
+  await user.openFiles(tower); // the mesh of a file is there again, and so is the work
   await user.until("window.__lpdeform.app.mesh.name === 'tower.off'");
-  await user.page.waitForTimeout(700);
   await reload();
+  expect(await user.ask("app.mesh.name")).toBe("tower.off");
+  await aside.getByRole("button", { name: "Bring it back" }).click();
+  await user.settled();
   expect(await work()).toBe(bent);
 });
 

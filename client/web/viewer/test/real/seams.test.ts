@@ -108,7 +108,7 @@ it("how far apart welded vertices may be is said, and can be chosen; the choice 
   await user.until(`window.__lpdeform.app.facts.now.report?.weldedVertices === ${rows + 1}`);
   await user.page.getByText(`${rows + 1} vertices lie on others`).waitFor();
   const { x, y } = await user.vertexOnPage(5 * (columns + 1) + 12);
-  await user.page.mouse.click(x, y); // what was only opened is not kept beside other work
+  await user.page.mouse.click(x, y);
   await user.until("window.__lpdeform.document().handles.length === 1");
   await user.settled();
   await user.page.waitForTimeout(700);
@@ -145,6 +145,29 @@ it("within a larger distance vertices inside of surfaces count, too, and are pai
   expect(await user.ask(`document().paintedP[${at(0)}]`)).toBe(1);
   await user.settled();
   expect(await user.page.locator(".banner").isHidden()).toBe(true);
+  expect(user.errors).toEqual([]);
+});
+
+it("a distance that would join the ends of an edge is refused, and what was chosen before stays", async () => {
+  const tiny = [0, 0, 20, 0.004, 0, 20, 0, 0.1, 20]; // an edge of 0.03 % of the size
+  const positions = Float32Array.from([...tube.positions, ...tiny]);
+  const faces = Uint32Array.from([...tube.faces, ...[0, 1, 2].map((corner) => vertexCount + corner)]);
+  await user.openFiles({ name: "tiny.off", content: writeOff({ ...tube, positions, faces }) });
+  await user.until(`window.__lpdeform.app.facts.now.report?.weldedVertices === ${rows + 1}`);
+  await openPanel();
+  const within = user.page.getByLabel("How far apart welded vertices may be");
+  const refusal = user.page.locator(".notice.bad", { hasText: "% of the size: its ends would be one vertex." });
+  await within.selectOption("0.1 % of the size");
+  await refusal.waitFor();
+  expect(await within.inputValue()).toBe("0.000001");
+  expect(await user.ask("app.view.now.weldTolerance")).toBe(1e-6);
+  expect(await user.ask("app.facts.now.report.weldedVertices")).toBe(rows + 1);
+  await within.selectOption("0.01 % of the size"); // less than the edge
+  await user.until("window.__lpdeform.app.view.now.weldTolerance === 1e-4");
+  await user.ask("app.facts.set({ notice: undefined })");
+  await user.ask("app.weld({ isOn: false, tolerance: 1e-3 })"); // whoever welds nothing may have any distance
+  expect(await user.ask("app.view.now.isWelded")).toBe(false);
+  expect(await refusal.isHidden()).toBe(true);
   expect(user.errors).toEqual([]);
 });
 

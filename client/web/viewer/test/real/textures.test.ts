@@ -108,6 +108,11 @@ it("the images of an OBJ are shown if they are opened with it and its MTL, also 
     await expect.poll(async () => isGreen(await user.colourAt(await at(6))), { timeout: 20_000 }).toBe(true);
   };
   await shown();
+  const project = { name: "sheet.lpdeform", content: await user.save("Project, to go on with (Ctrl+S)") };
+  await user.ask(`app.openShape("sheet", "coarse")`);
+  await user.openFiles(project);
+  await user.until(`Object.keys(window.__lpdeform.app.mesh.materials ?? {}).length === 2`);
+  await shown();
   const { x, y } = await at(4);
   await user.page.locator("canvas.stage").focus();
   await user.page.keyboard.press("1");

@@ -35,6 +35,27 @@ it("a finger drags a handle, and the surface follows", async () => {
   expect(Math.max(...bent.map((value, k) => Math.abs(value - rest[k]!)))).toBeGreaterThan(0.2);
 });
 
+it("no notice lies over what a finger drags", async () => {
+  const notice = user.page.locator(".notice");
+  const isShown = () => notice.evaluate((element) => element.checkVisibility({ visibilityProperty: true }));
+  const { x, y } = await user.vertexOnPage(await user.ask<number>("document().handles[1].vertices[0]"));
+  const devtools = await user.page.context().newCDPSession(user.page);
+  const send = (type: "touchStart" | "touchMove" | "touchEnd", touchPoints: Point[]) =>
+    devtools.send("Input.dispatchTouchEvent", { type, touchPoints });
+  for (const isBad of [false, true]) {
+    await user.ask(`app.notify("What was just opened", ${isBad})`);
+    expect(await isShown()).toBe(true);
+    await send("touchStart", [{ x, y }]);
+    await send("touchMove", [{ x: x + 20, y }]);
+    await expect.poll(isShown).toBe(false);
+    await send("touchMove", [{ x, y }]);
+    await send("touchEnd", []);
+    await expect.poll(isShown).toBe(isBad); // an error has still to be read
+  }
+  await devtools.detach();
+  await user.settled();
+});
+
 it("a tap on the surface places a handle", async () => {
   const { x, y } = await user.vertexOnPage(await user.vertexNear([0.5, 0, 2]));
   await user.page.touchscreen.tap(x, y);

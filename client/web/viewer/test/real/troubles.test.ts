@@ -1,6 +1,7 @@
 import { join } from "node:path";
 import { afterEach, describe, expect, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
+import { make3mf, makeDae, makeFbx } from "../made_foreign.js";
 import { User } from "./user.js";
 
 const files = join(import.meta.dirname, "../../dist");
@@ -22,7 +23,10 @@ afterEach(async () => {
   while (open.length > 0) await open.pop()!.stop();
 });
 
-const banner = (user: User, words: string, timeout = 30_000) =>
+/** What is said of a server or a proxy that has stopped: the second as soon as Envoy's checks of the server's health have failed. */
+const stopped = /The server (does not answer|is away)/;
+
+const banner = (user: User, words: string | RegExp, timeout = 30_000) =>
   user.page.locator(".banner", { hasText: words }).waitFor({ timeout });
 
 describe("the page says plainly, and goes on by itself when", () => {
@@ -84,11 +88,13 @@ describe("the page says plainly, and goes on by itself when", () => {
       const stoppedAt = performance.now();
       service.pause(part);
       let isOver = false;
-      const said = banner(user, "The server does not answer", 20_000).finally(() => (isOver = true));
+      const said = banner(user, stopped, 20_000).finally(() => (isOver = true));
       for (let k = 0; isDragging && !isOver; ++k) await mouse.move(x + 60 * Math.sin(k / 20), y + 5);
       await said;
       expect(performance.now() - stoppedAt).toBeLessThan(2000);
-      expect(await user.page.locator(".pill").textContent()).toBe("The server does not answer");
+      await user.page.waitForTimeout(1000); // and it stays
+      expect(await user.page.locator(".banner", { hasText: stopped }).isVisible()).toBe(true);
+      expect(await user.page.locator(".pill").textContent()).toMatch(stopped);
       service.resume(part);
       await mouse.up();
       await user.page.locator(".banner").waitFor({ state: "hidden" });
@@ -106,6 +112,28 @@ describe("the page says plainly, and goes on by itself when", () => {
     await banner(user, "The server cannot take this change");
     await user.ask(`app.change({ ...window.__lpdeform.document(), p: 2 })`);
     await user.page.locator(".banner").waitFor({ state: "hidden" });
+  });
+
+  it("the page itself fails with every frame: it stops after some tries, and tries again when it is told to", async () => {
+    const service = await start();
+    const user = await visit(service);
+    await user.settled();
+    await user.page.evaluate(() => {
+      const { watcher } = (window as any).__lpdeform.app.panes[0].live;
+      const { frame } = watcher;
+      watcher.frame = () => {
+        throw new RangeError("Array buffer allocation failed");
+      };
+      Object.assign(window, { mend: () => (watcher.frame = frame) });
+    });
+    await user.ask(`app.change({ ...window.__lpdeform.document(), p: 3 })`);
+    await banner(user, "This page fails with every frame");
+    expect(await user.page.locator(".banner").textContent()).toContain("RangeError: Array buffer allocation failed.");
+    await user.page.evaluate("mend()");
+    await user.page.locator(".banner").getByRole("button", { name: "Try again" }).click();
+    await user.settled();
+    await user.page.locator(".banner").waitFor({ state: "hidden" });
+    expect(user.errors).toEqual([]);
   });
 
   it("there is no server yet", async () => {
@@ -149,6 +177,16 @@ describe("the page's policy", () => {
     await page.getByRole("menuitem", { name: "Picture as PNG" }).click();
     await download;
     expect(await page.locator(".stops .stop").nth(1).getAttribute("style")).toContain("--share");
+    const asked: string[] = [];
+    page.on("request", (request) => asked.push(request.url()));
+    for (const [name, content] of Object.entries({ "a.fbx": makeFbx(), "a.dae": makeDae(), "a.3mf": make3mf() })) {
+      const chooser = page.waitForEvent("filechooser");
+      await page.getByRole("button", { name: "Open" }).click();
+      await (await chooser).setFiles([{ name, mimeType: "application/octet-stream", buffer: Buffer.from(content) }]);
+      await page.locator(".notice", { hasText: `${name} is opened as a.glb.` }).waitFor();
+    }
+    expect(asked.join()).toMatch(/foreign_worker/);
+    expect(asked.join()).not.toMatch(/foreign_glb/); // the page itself reads none
     expect(said).toEqual([]);
 
     const framing = await context.newPage();

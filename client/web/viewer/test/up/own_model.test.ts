@@ -81,6 +81,7 @@ it("bends a model of their own within a minute of opening the page, led by what 
     await user.drag(await user.vertexOnPage(row(rows)[0]!), 150, 40);
     await user.settled();
   });
+  expect(await user.page.locator(".notice").isHidden()).toBe(true);
   const person = secondsPerAction * actions;
   const work = (await up.computedWith(browser)) - idle;
   const passed = (performance.now() - start) / 1000;
