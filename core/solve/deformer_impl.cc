@@ -105,7 +105,7 @@ Problem Deformer::Impl::make_problem() {
           stop};
 }
 
-/// Makes the coarse level if there is none. False if the mesh cannot be coarsened.
+/// Makes the coarse level if there is none. False if the mesh cannot be coarsened, which is tried once.
 bool Deformer::Impl::make_coarse() {
   const auto make_solver = [this](std::shared_ptr<const RestShape> level) -> std::unique_ptr<LevelSolver> {
     const DeformerOptions of_level{.free_components = FreeComponents::kStay,
@@ -115,9 +115,10 @@ bool Deformer::Impl::make_coarse() {
     auto deformer = Deformer::create(std::move(level), of_level);
     return deformer.ok() ? std::make_unique<DeformerOfLevel>(*std::move(deformer)) : nullptr;
   };
-  if (!coarse) {
+  if (!coarse && !is_coarsest) {
     CoarseMesh mesh = coarse_mesh ? *std::exchange(coarse_mesh, {}) : CoarseLevel::coarsened(*shape);
     coarse = CoarseLevel::create(*shape, std::move(mesh), make_solver);
+    is_coarsest = coarse == nullptr;
   }
   return coarse != nullptr;
 }

@@ -142,6 +142,7 @@ struct Deformer::Impl {
   std::stop_token stop;
   std::optional<LpNorm> norm;           // true norm, and the reference of the running solve
   std::unique_ptr<CoarseLevel> coarse;  // made when first needed
+  bool is_coarsest = false;             // it could not be made
   enum class Lead {
     kNone,   // the coarse level's state has nothing to do with x
     kAhead,  // it is for the same inputs, but x is at most a look at it (Multiresolution::intermediate_state)

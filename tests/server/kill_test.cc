@@ -38,6 +38,8 @@ int number_from_environment(const char* name, int otherwise) {
 /// A value that may be seen: any that was sent after the last one that was kept, or that one.
 class Possible {
  public:
+  explicit Possible(double at_first) : values_{{0, at_first}} {}
+
   void sent(std::uint64_t seq, double value) { values_[seq] = value; }
   void kept(std::uint64_t seq) {
     const auto found = values_.find(seq);
@@ -52,7 +54,7 @@ class Possible {
   }
 
  private:
-  std::map<std::uint64_t, double> values_{{0, 0.0}};
+  std::map<std::uint64_t, double> values_;
   std::uint64_t kept_ = 0;
 };
 
@@ -214,7 +216,7 @@ class Writer {
   bool is_made_ = false;
   std::uint64_t sent_ = 0, acknowledged_ = 0, kept_seq_ = 0, epoch_ = 0, p_seq_ = 0;
   std::set<std::uint64_t> of_p_;  // those of the updates that set p
-  Possible tip_, p_;
+  Possible tip_{0}, p_{2};
   int lost_ = 0;
 };
 
