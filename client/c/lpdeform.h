@@ -10,6 +10,10 @@
  *     if (lpdeform_poll(session, &buffers, &frame, &error) == LPDEFORM_OK) upload the vertex buffer
  *   lpdeform_close(session); lpdeform_disconnect(client);
  *
+ * The address is that of the server if the library has gRPC in it, as a build of the project makes it. A library of
+ * deploy/engine-library and of the packages for engines and .NET has gRPC-Web in it, and is given the address of the
+ * Envoy in front of the server: "localhost:8080" with deploy/up.
+ *
  * Rules that hold throughout.
  *
  * Time. A function whose comment begins with WAITS waits for the network. All other functions only copy their
@@ -103,8 +107,11 @@ typedef struct lpdeform_session lpdeform_session;
 
 typedef struct lpdeform_connection {
   uint32_t struct_size;
-  uint32_t tls;                   /* 1: TLS; 0: plain text; the PEM texts below must then be NULL */
-  const char* address;            /* "host:port", "unix:/path", "dns:///name:port" */
+  uint32_t tls; /* 1: TLS; 0: plain text; the PEM texts below must then be NULL */
+  /* Of the server: "host:port", "unix:/path", or another name that gRPC knows, such as "dns:///name:port". A library
+   * with gRPC-Web takes the address of Envoy instead: "host:port", "http://host:port", "https://host:port" or
+   * "unix:/path". Others are refused (ADDRESS_INVALID). */
+  const char* address;
   const char* root_certificates;  /* PEM: trusted roots; NULL: those that the system trusts */
   const char* certificate_chain;  /* PEM: of this client, if the server requires one (mutual TLS) */
   const char* private_key;        /* PEM */

@@ -22,7 +22,10 @@ namespace Lpdeform
     {
         IntPtr client;
 
-        /// `address`: "host:port". Does not wait; the connection is made in the background.
+        /// `address`: with the C library of a package, which has gRPC-Web in it, that of the Envoy in front of a server:
+        /// "host:port", "http://host:port" or "https://host:port"; "localhost:8080" with deploy/up. With the C library of
+        /// a build of the project, which has gRPC in it, that of the server: "host:port"; "localhost:50051".
+        /// Does not wait; the connection is made in the background.
         public Client(string address, ConnectionOptions options = null)
         {
             if (Native.lpdeform_abi() != 1) throw new NotSupportedException("This assembly is for another lpdeform_client.");

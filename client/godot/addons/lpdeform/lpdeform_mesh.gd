@@ -26,7 +26,8 @@ signal failed(text: String)
 			source.changed.connect(_begin_soon)
 		_begin_soon()
 
-## The server: "host:port", or "unix:/path" on the same machine.
+## The server: "host:port", or "unix:/path" on the same machine. If the add-on was built with a library of deploy/engine-library, the Envoy
+## in front of the server: "host:port", "http://host:port" or "https://host:port"; "localhost:8080" with deploy/up.
 @export var address := "localhost:50051":
 	set(value):
 		address = value
