@@ -11,6 +11,7 @@ constexpr double kFarthestGuess = 2;  // the guess continues the last move by le
 constexpr double kSameWay = 0.5;      // two moves count as one drag above this squared cosine between them
 // In such a drag, the squared ratio of the surface's largest move to the handles' largest move is below this.
 constexpr double kSteady = 9;
+constexpr double kMostAbove = 2;  // see is_good
 
 }  // namespace
 
@@ -57,14 +58,20 @@ std::optional<Points> Deformer::Impl::led_guess() {
   u += moved;
   if (!u.allFinite()) return std::nullopt;
   lead = Lead::kTogether;
-  x_before_move.resize(0, 3);
-  // If some p_i > 2, the weights of the move before differ so much that a step in their metric is cut short.
-  if (material.p.maxCoeff() > 2) warmth = Warmth::kWarm;
   return u;
+}
+
+/// Whether a led guess is not much worse than the other one: at p = 2 its E^(1/2) is at most kMostAbove times as high. It may be higher,
+/// because it has kinks that the first iterations take away. At a large p a few kinks would decide.
+bool Deformer::Impl::is_good(const Points& led, const Points& other) {
+  const LpNorm even(Material::uniform(2), shape->vertex_count(), unit(), 1);
+  const double most = kMostAbove * kMostAbove * objective.evaluate(other, even);
+  return objective.evaluate(led, even) <= most;
 }
 
 /// Lets the coarse level, where there is one, follow to `guess`, so that it can lead from the next move on.
 void Deformer::Impl::follow(const Points& guess) {
+  lead = Lead::kNone;
   if (make_coarse() && coarse->go_to(coarse_inputs(effective_material()), guess).ok()) lead = Lead::kTogether;
 }
 
@@ -85,11 +92,12 @@ Points Deformer::Impl::current_guess() {
   }
   const SoftTerms& before = objective.soft_terms();
   if (constraints->soft.has_rows_of(before)) constraints->soft.add_pull(before, forces);
-  if (left == 0 && forces.isZero(0)) return x;
-  const bool can_lead = warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, bending);
-  if (can_lead) {
-    if (std::optional<Points> led = led_guess()) return *std::move(led);
+  if (left == 0 && forces.isZero(0)) {
+    lead = Lead::kNone;  // the fine level goes on alone
+    return x;
   }
+  const bool can_lead = warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, bending);
+  std::optional<Points> led = can_lead ? led_guess() : std::nullopt;
   const double share = size > 0 ? along / size : 0;
   const bool goes_on = share > 0 && share < kFarthestGuess && along * along > kSameWay * size * left &&
                        last.rowwise().squaredNorm().maxCoeff() < kSteady * longest;
@@ -102,7 +110,13 @@ Points Deformer::Impl::current_guess() {
   metric.extend(constraints->is_held, u, workers(), &forces);
   if (goes_on) u += share * last;
   Points guess = x + u;
-  if (can_lead && guess.allFinite()) follow(guess);
+  if (!can_lead || !guess.allFinite()) return guess;
+  if (led && is_good(*led, guess)) {
+    // If some p_i > 2, the weights of the move before differ so much that a step in their metric is cut short.
+    if (material.p.maxCoeff() > 2) warmth = Warmth::kWarm;
+    return *std::move(led);
+  }
+  follow(guess);
   return guess;
 }
 

@@ -14,6 +14,7 @@
 namespace lpdeform {
 namespace {
 
+constexpr int kMostTogether = 12;            // fine iterations after which the coarse level does not lead on
 constexpr double kCertificateSeconds = 1;    // it may take this long, even beyond the time limit
 constexpr std::size_t kCopyChunk = 4096;     // vertices
 constexpr std::int32_t kLargeAtTwo = 10000;  // the same if every p is 2, where the gain is smaller
@@ -304,6 +305,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   norm.emplace(effective_material(), shape->vertex_count(), unit(), reference);
   objective.reweigh(*norm);  // typical_energy has evaluated the guess
   best_sum = std::numeric_limits<double>::infinity();
+  fine_iterations = 0;
   minimiser = make_minimiser(settings.method, std::move(guess), warmth);
   factor = settings.method == Method::kQuasiNewton ? Factor::kQuasiNewton : Factor::kUsable;
   const double sum = objective.sum(*norm);
@@ -317,7 +319,13 @@ void Deformer::Impl::iterate() {
   ++summary.iterations;
   if (search) return search_on();
   const StepResult result = minimiser->step();
-  if (settings.method == Method::kMultiresolution) lead = result.stage == 0 ? Lead::kAhead : Lead::kTogether;
+  const bool is_ahead = settings.method == Method::kMultiresolution && result.stage == 0;
+  if (!is_ahead) ++fine_iterations;
+  // After many iterations x has settled and the coarse level has not. At the next move it would take x the same way again.
+  if (fine_iterations > kMostTogether && !is_coarse())
+    lead = Lead::kNone;
+  else if (settings.method == Method::kMultiresolution)
+    lead = is_ahead ? Lead::kAhead : Lead::kTogether;
   double sum = result.true_sum ? *result.true_sum : objective.sum(*norm);
   keep_if_best(sum);
   const bool is_over = result.outcome == Outcome::kConverged || result.outcome == Outcome::kStalled;
@@ -346,6 +354,8 @@ void Deformer::Impl::settle(StopReason reason) {
 }
 
 void Deformer::Impl::end_minimiser(StopReason reason) {
+  const bool has_settled = reason == StopReason::kConverged || reason == StopReason::kStalled;
+  if (has_settled && !is_coarse()) lead = Lead::kNone;
   // Who cancels is in a hurry; every other result must not depend on whether somebody has looked on.
   const bool is_last = reason != StopReason::kCancelled;
   if (is_last) forget_looks();
@@ -400,11 +410,10 @@ void Deformer::Impl::replace_constraints(Constraints next) {
         next.footprint.size() == constraints->footprint.size() && next.footprint == constraints->footprint;
     const bool has_rows_of_before =
         next.linear.reuse(constraints->linear) && next.soft.has_rows_of(constraints->soft);
-    if (!has_footprint_of_before) {
-      forget_weights();
-      lead = Lead::kNone;
-    }
+    if (!has_footprint_of_before) forget_weights();
     if (!has_rows_of_before) factor = Factor::kOutdated;
+    if (!has_footprint_of_before || !has_rows_of_before || next.is_held != constraints->is_held)
+      lead = Lead::kNone;
   }
   constraints = std::move(next);
 }

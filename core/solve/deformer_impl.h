@@ -39,6 +39,7 @@ struct Deformer::Impl {
   Points current_guess();
   std::optional<Points> led_guess();
   void follow(const Points& guess);
+  bool is_good(const Points& led, const Points& other);
   FineInputs coarse_inputs(const Material& effective) const;
   SoftTerms guess_springs() const;
   Points initial_guess(InitialGuess guess);
@@ -85,6 +86,8 @@ struct Deformer::Impl {
   double seconds() const;  // since `started`
   /// The factor's weights are not those that quasi_newton left any more.
   void forget_weights() { factor = std::min(factor, Factor::kUsable); }
+  /// Whether this is a coarse level that bends like a finer one. Such levels go on together with theirs.
+  bool is_coarse() const { return bending < 1; }
   void interrupt() {
     certificate.reset();
     if (search && is_search_apart)
@@ -146,9 +149,10 @@ struct Deformer::Impl {
   enum class Lead {
     kNone,   // the coarse level's state has nothing to do with x
     kAhead,  // it is for the same inputs, but x is at most a look at it (Multiresolution::intermediate_state)
-    kTogether,  // it is for the same inputs
+    kTogether,  // it is for the same inputs, and has come as far as x
   };
   Lead lead = Lead::kNone;
+  int fine_iterations = 0;  // of the running solve
   std::unique_ptr<Minimiser> minimiser;
   std::unique_ptr<MinimaSearch> search;      // runs after the minimiser has ended
   bool is_search_apart = false;              // its result goes to `better`, not to x

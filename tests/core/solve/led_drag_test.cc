@@ -16,7 +16,7 @@ class LedDragTest : public testing::TestWithParam<double> {
 
   LedDragTest() { EXPECT_TRUE(live->solve({}).ok()); }
 
-  HandleSet bent(int moves) const {
+  HandleSet bent(double moves) const {
     HandleSet handles;
     (void)handles.set("left", {slice(mesh, 0, 0, 0), Fixed{}});
     (void)handles.set("right", {right, turn(Eigen::Vector3d::UnitY(), -3.0 * moves, {0.5 * kSide, 0, 0},
@@ -120,6 +120,45 @@ TEST_P(LedDragAtTwoTest, ACancelledMoveLeavesAFiniteStateAndTheNextGoesOn) {
   EXPECT_TRUE(live->positions().allFinite());
   for (int number = 3; number < 8; ++number) (void)move(number);
   EXPECT_LE(above_minimum(move(8)), 1.2);
+}
+
+// What the fine level has done alone must not come a second time, from the coarse levels.
+
+/// 86 times the minimum, were it so.
+TEST_P(LedDragAtTwoTest, AHandleThatIsGoneLeavesNoMotionBehind) {
+  const auto with_patch = [&](int number) {
+    HandleSet handles = bent(number);
+    (void)handles.set("patch", {slice(mesh, 0, kSide / 2, kSide / 2),
+                                turn(Eigen::Vector3d::UnitY(), 0, {0, 0, 0}, {0, 0, 0.05 * kSide * number})});
+    return handles;
+  };
+  for (int number = 1; number <= 4; ++number) {
+    ASSERT_TRUE(live->set_handles(with_patch(number)).ok());
+    (void)solve(*live, 2);
+  }
+  ASSERT_TRUE(live->set_handles(bent(4)).ok());
+  (void)solve(*live, 300);
+  EXPECT_LE(above_minimum(move(5, 2)), 2);
+}
+
+/// It would move by as much as in settling.
+TEST_P(LedDragAtTwoTest, ASettledSurfaceMovesAsLittleAsItsHandle) {
+  for (int number = 1; number <= 10; number += 3) (void)move(number);
+  (void)solve(*live, 1000);
+  const Points settled = live->positions();
+  (void)move(11);
+  const Points moved = live->positions() - settled;
+  EXPECT_LE(moved.rowwise().norm().maxCoeff(), 2 * rows_of(moved, right).rowwise().norm().maxCoeff());
+}
+
+/// 7 times the minimum, were the unfinished coarse state taken for that of the surface.
+TEST_P(LedDragAtTwoTest, ACutColdSolveIsForgottenOnceTheSurfaceHasConverged) {
+  auto cut = deformer(shape, bent(15), Material::uniform(2));
+  SolveSettings cold{.initial = InitialGuess::kLaplacian, .max_iterations = 3, .effort = 0};
+  ASSERT_TRUE(cut->solve(cold).ok());
+  const double settled = solve(*cut, 1000).energy;
+  ASSERT_TRUE(cut->set_handles(bent(15.1)).ok());
+  EXPECT_LE(std::sqrt(solve(*cut, 2).energy / settled), 1.2);
 }
 
 INSTANTIATE_TEST_SUITE_P(AtTwo, LedDragAtTwoTest, testing::Values(2.0));
