@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <memory>
 #include <vector>
 
 #include "tests/core/poses.h"
@@ -46,20 +47,32 @@ double time_to(Deformer& deformer, const HandleSet& handles, double p, double en
   return seconds_since(start);
 }
 
+/// What a run is about: a bumpy sheet with `side` cells along an edge, and p.
+struct Sheet {
+  explicit Sheet(const benchmark::State& state)
+      : side(static_cast<int>(state.range(0))), p(static_cast<double>(state.range(1)) / 10) {}
+
+  HandleSet after(int moves) const { return handles_at(mesh, side, double(moves) / kMoves); }
+  std::unique_ptr<Deformer> at_rest() const {
+    auto result = deformer(shape, after(0), Material::uniform(p), {.threads = 2});
+    (void)result->solve({});
+    return result;
+  }
+
+  int side;
+  double p;
+  TriangleMesh mesh = grid(side, side, 2);
+  std::shared_ptr<const RestShape> shape = rest_shape(mesh);
+};
+
 void drag(benchmark::State& state) {
-  const auto side = static_cast<int>(state.range(0));
-  const double p = static_cast<double>(state.range(1)) / 10;
-  const TriangleMesh mesh = grid(side, side, 2);
-  const auto shape = rest_shape(mesh);
+  const Sheet sheet(state);
+  const double p = sheet.p;
   std::vector<double> times;
   for (auto _ : state) {
-    const DeformerOptions options{.threads = 2};
-    auto live = deformer(shape, handles_at(mesh, side, 0), Material::uniform(p), options);
-    auto converged = deformer(shape, handles_at(mesh, side, 0), Material::uniform(p), options);
-    (void)live->solve({});
-    (void)converged->solve({});
+    const auto live = sheet.at_rest(), converged = sheet.at_rest();
     for (int move = 1; move <= kMoves; ++move) {
-      const HandleSet handles = handles_at(mesh, side, double(move) / kMoves);
+      const HandleSet handles = sheet.after(move);
       (void)converged->set_handles(handles);
       const double best = converged->solve({.time_limit_seconds = kLongest, .effort = 0}).value().energy;
       times.push_back(time_to(*live, handles, p, kUseful * std::pow(best, 1 / p)));
@@ -70,30 +83,25 @@ void drag(benchmark::State& state) {
   std::ranges::sort(times);
   state.counters["p50_ms"] = 1e3 * times[times.size() / 2];
   state.counters["p99_ms"] = 1e3 * times[times.size() * 99 / 100];
-  state.counters["vertices"] = shape->vertex_count();
+  state.counters["vertices"] = sheet.shape->vertex_count();
 }
+
 /// Every sixth frame is measured against a second solver, which goes on from the last frame it had.
 void paced(benchmark::State& state) {
   constexpr double kPace = 0.033;
-  const auto side = static_cast<int>(state.range(0));
-  const double p = static_cast<double>(state.range(1)) / 10;
-  const TriangleMesh mesh = grid(side, side, 2);
-  const auto shape = rest_shape(mesh);
+  const Sheet sheet(state);
+  const double p = sheet.p;
   std::vector<double> above, frames;
   double useful = 0, near = 0;
   for (auto _ : state) {
-    const DeformerOptions options{.threads = 2};
-    auto live = deformer(shape, handles_at(mesh, side, 0), Material::uniform(p), options);
-    auto converged = deformer(shape, handles_at(mesh, side, 0), Material::uniform(p), options);
-    (void)live->solve({});
-    (void)converged->solve({});
+    const auto live = sheet.at_rest(), converged = sheet.at_rest();
     const auto best_at = [&](int move) {
-      (void)converged->set_handles(handles_at(mesh, side, double(move) / kMoves));
+      (void)converged->set_handles(sheet.after(move));
       return std::pow(converged->solve({.time_limit_seconds = kLongest, .effort = 0}).value().energy, 1 / p);
     };
     for (int move = 1; move < kMoves; ++move) {
       const auto start = std::chrono::steady_clock::now();
-      (void)live->set_handles(handles_at(mesh, side, double(move) / kMoves));
+      (void)live->set_handles(sheet.after(move));
       (void)live->start({.effort = 0});
       while (seconds_since(start) < kPace && live->step()) {
       }
@@ -102,7 +110,7 @@ void paced(benchmark::State& state) {
       if (move % 6 == 0) above.push_back(std::pow(live->summary().energy, 1 / p) / best_at(move));
     }
     const double best = best_at(kMoves);
-    useful = time_to(*live, handles_at(mesh, side, 1), p, kUseful * best);
+    useful = time_to(*live, sheet.after(kMoves), p, kUseful * best);
     const auto start = std::chrono::steady_clock::now();
     while (std::pow(live->summary().energy, 1 / p) > 1.01 * best && live->step()) {
     }
@@ -114,7 +122,7 @@ void paced(benchmark::State& state) {
   state.counters["frame_ms"] = 1e3 * frames[frames.size() / 2];
   state.counters["last_5%_ms"] = 1e3 * useful;
   state.counters["last_1%_ms"] = 1e3 * near;
-  state.counters["vertices"] = shape->vertex_count();
+  state.counters["vertices"] = sheet.shape->vertex_count();
 }
 BENCHMARK(paced)
     ->ArgsProduct({{316}, {10, 15, 20, 60}})

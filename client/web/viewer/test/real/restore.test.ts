@@ -185,7 +185,7 @@ it("work that another shape or a file replaced, or that was discarded, is brough
   expect(await aside.isHidden()).toBe(true);
 });
 
-it("the note of work that was set aside makes room for whoever goes on, and what to do next is said beside it", async () => {
+it("the note that work was set aside goes when one goes on, and the hint what to do next stands beside it", async () => {
   await bend();
   await user.openFiles({ name: "tower.off", content: writeOff(blockSurface(2, 2, 6, () => true)) });
   const aside = user.page.locator(".aside", { hasText: "“bar” was set aside with your work on it." });

@@ -165,7 +165,7 @@ it("a distance that would join the ends of an edge is refused, and what was chos
   await within.selectOption("0.01 % of the size"); // less than the edge
   await user.until("window.__lpdeform.app.view.now.weldTolerance === 1e-4");
   await user.ask("app.facts.set({ notice: undefined })");
-  await user.ask("app.weld({ isOn: false, tolerance: 1e-3 })"); // whoever welds nothing may have any distance
+  await user.ask("app.weld({ isOn: false, tolerance: 1e-3 })"); // no limit on the distance where nothing is welded
   expect(await user.ask("app.view.now.isWelded")).toBe(false);
   expect(await refusal.isHidden()).toBe(true);
   expect(user.errors).toEqual([]);
