@@ -1,78 +1,38 @@
 #pragma once
 
-#include <gtest/gtest.h>
-
-#ifdef _WIN32
-#include <winsock2.h>
-#else
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
-#endif
-
-#include <cstdint>
-#include <cstdlib>
 #include <string>
 
 namespace lpdeform::client {
 
-enum class Transport { kPlain, kTls };
-
-/// The InProcessServer of programs that cannot have one, because they are for another system: it is in the program
-/// serve_tests, which has started this one. LPDEFORM_TEST_PORT is serve_tests' port on this machine.
-class InProcessServer {
+/// A server in the program serve_tests, for programs that cannot have one in themselves, because they are for another system.
+/// serve_tests has started this program.
+class RemoteServer {
  public:
-  explicit InProcessServer(Transport transport = Transport::kPlain) {
-    const std::string said = ask(transport == Transport::kTls ? "/open?tls=1" : "/open");
-    id_ = said.substr(0, said.find(' '));
-    address_ = said.substr(said.find(' ') + 1);
-  }
-  ~InProcessServer() { ask("/close?id=" + id_); }
-  InProcessServer(const InProcessServer&) = delete;
-  InProcessServer& operator=(const InProcessServer&) = delete;
+  /// `kind`: one that serve_tests has, and what it may be told: "real&tls=1".
+  explicit RemoteServer(const std::string& kind);
+  ~RemoteServer();
+  RemoteServer(const RemoteServer&) = delete;
+  RemoteServer& operator=(const RemoteServer&) = delete;
 
-  void stop() { ask("/stop?id=" + id_); }
-  void start_again() { ask("/start?id=" + id_); }
-  std::string address() const { return address_; }
-  std::string root_certificates() const { return ask("/roots?id=" + id_); }
+  const std::string& address() const { return address_; }
+
+  /// What the server answers to one of the questions that serve_tests has for its kind.
+  std::string ask(const std::string& question) const;
 
  private:
-  /// The body of the answer to a GET request.
-  static std::string ask(const std::string& path) {
-#ifdef _WIN32
-    static WSADATA data;
-    static const int ready = WSAStartup(MAKEWORD(2, 2), &data);
-    EXPECT_EQ(ready, 0);
-#endif
-    const char* const port = std::getenv("LPDEFORM_TEST_PORT");
-    EXPECT_NE(port, nullptr) << "start this program by serve_tests";
-    const auto connection = socket(AF_INET, SOCK_STREAM, 0);
-    sockaddr_in to{};
-    to.sin_family = AF_INET;
-    to.sin_port = htons(static_cast<std::uint16_t>(std::atoi(port != nullptr ? port : "0")));
-    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    EXPECT_EQ(connect(connection, reinterpret_cast<sockaddr*>(&to), sizeof to), 0) << "serve_tests is away";
-    const std::string request = "GET " + path + " HTTP/1.0\r\n\r\n";
-    send(connection, request.data(), static_cast<int>(request.size()), 0);
-    std::string answer;
-    char bytes[512];
-    for (;;) {
-      const auto count = recv(connection, bytes, sizeof bytes, 0);
-      if (count <= 0) break;
-      answer.append(bytes, static_cast<std::size_t>(count));
-    }
-#ifdef _WIN32
-    closesocket(connection);
-#else
-    close(connection);
-#endif
-    EXPECT_NE(answer.find(" 200 "), answer.npos) << path << ": " << answer;
-    const std::size_t body = answer.find("\r\n\r\n");
-    return body == answer.npos ? "" : answer.substr(body + 4);
-  }
-
   std::string id_, address_;
+};
+
+enum class Transport { kPlain, kTls };
+
+/// That of in_process_server.h, behind Envoy.
+class InProcessServer : public RemoteServer {
+ public:
+  explicit InProcessServer(Transport transport = Transport::kPlain)
+      : RemoteServer(transport == Transport::kTls ? "real&tls=1" : "real") {}
+  std::string root_certificates() const { return ask("roots"); }
+  void stop() { ask("stop"); }
+  void start_again() { ask("start"); }
 };
 
 }  // namespace lpdeform::client

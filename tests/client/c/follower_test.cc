@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "core/shapes/shapes.h"
-#include "tests/client/in_process_server.h"
+#include "tests/client/servers.h"
 
 namespace lpdeform {
 namespace {

@@ -10,11 +10,7 @@
 
 #include "client/c/lpdeform.h"
 #include "tests/client/c/shapes.h"
-#ifdef LPDEFORM_REMOTE_SERVER
-#include "tests/client/remote_server.h"
-#else
-#include "tests/client/in_process_server.h"
-#endif
+#include "tests/client/servers.h"
 
 namespace lpdeform::engine {
 

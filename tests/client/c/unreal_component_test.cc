@@ -8,7 +8,7 @@
 
 #include "DynamicMesh/MeshNormals.h"
 #include "client/unreal/Source/LpdeformUnreal/Public/LpdeformComponent.h"
-#include "tests/client/in_process_server.h"
+#include "tests/client/servers.h"
 
 namespace lpdeform {
 namespace {
