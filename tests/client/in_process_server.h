@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "server/server.h"
 #ifdef LPDEFORM_DEPLOY_WEB
@@ -20,7 +21,11 @@ namespace lpdeform::client {
 class InProcessServer {
  public:
 #ifdef LPDEFORM_DEPLOY_WEB
-  explicit InProcessServer(Transport transport = Transport::kPlain) {
+  explicit InProcessServer(Transport transport = Transport::kPlain)
+      : InProcessServer(ServerOptions(), transport) {}
+
+  explicit InProcessServer(ServerOptions options, Transport transport = Transport::kPlain)
+      : options_(std::move(options)) {
     start_again();
     if (!server_) return;
     front_ = std::make_unique<WebFront>(server_->address(), transport);
@@ -36,7 +41,7 @@ class InProcessServer {
     return front_->address();
   }
 #else
-  InProcessServer() {
+  explicit InProcessServer(ServerOptions options = {}) : options_(std::move(options)) {
     std::string name = (std::filesystem::temp_directory_path() / "lpdeform-test-XXXXXX").string();
     EXPECT_NE(mkdtemp(name.data()), nullptr);
     folder_ = name;
@@ -58,15 +63,15 @@ class InProcessServer {
   }
 
   void start_again() {
-    ServerOptions options;
-    options.address = listening();
-    options.threads = 2;
-    auto server = Server::start(options);
+    options_.address = listening();
+    options_.threads = 2;
+    auto server = Server::start(options_);
     ASSERT_TRUE(server.ok()) << server.status();
     server_ = *std::move(server);
   }
 
  private:
+  ServerOptions options_;
 #ifdef LPDEFORM_DEPLOY_WEB
   std::string listening() const {
     return front_ ? front_->server() : "127.0.0.1:0";

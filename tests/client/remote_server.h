@@ -23,9 +23,10 @@ class RemoteServer {
   std::string id_, address_;
 };
 
+// The classes of the same names in in_process_server.h and token_server.h, each behind Envoy.
+
 enum class Transport { kPlain, kTls };
 
-/// That of in_process_server.h, behind Envoy.
 class InProcessServer : public RemoteServer {
  public:
   explicit InProcessServer(Transport transport = Transport::kPlain)
@@ -33,6 +34,12 @@ class InProcessServer : public RemoteServer {
   std::string root_certificates() const { return ask("roots"); }
   void stop() { ask("stop"); }
   void start_again() { ask("start"); }
+};
+
+class TokenServer : public RemoteServer {
+ public:
+  TokenServer() : RemoteServer("tokens") {}
+  std::string token() const { return ask("token"); }
 };
 
 }  // namespace lpdeform::client

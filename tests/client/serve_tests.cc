@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -13,38 +14,66 @@
 #include <thread>
 
 #include "tests/client/in_process_server.h"
+#include "tests/client/token_server.h"
 
 #include <httplib.h>  // last: its headers define _res, a name that Eigen has
 
 namespace {
 
-using lpdeform::client::InProcessServer;
-using lpdeform::client::Transport;
+using namespace lpdeform::client;
+
+struct Opened {
+  std::shared_ptr<const void> server;
+  std::string address;
+  std::map<std::string, std::function<std::string()>> answers;  // by question
+};
+
+Opened open_real(const httplib::Params& told) {
+  const auto server =
+      std::make_shared<InProcessServer>(told.contains("tls") ? Transport::kTls : Transport::kPlain);
+  return {server,
+          server->address(),
+          {{"roots", [server] { return server->root_certificates(); }},
+           {"start", [server] { return server->start_again(), ""; }},
+           {"stop", [server] { return server->stop(), ""; }}}};
+}
+
+Opened open_with_tokens(const httplib::Params&) {
+  const auto server = std::make_shared<TokenServer>();
+  return {server, server->address(), {{"token", [server] { return server->token(); }}}};
+}
 
 /// Servers by their numbers.
 class Servers {
  public:
-  std::string open(Transport transport) {
-    auto server = std::make_unique<InProcessServer>(transport);
+  std::string open(const httplib::Params& told) {
+    static const std::map<std::string, Opened (*)(const httplib::Params&)> kKinds{
+        {"real", open_real}, {"tokens", open_with_tokens}};
+    const auto kind = told.find("kind");
+    Opened opened = kKinds.at(kind == told.end() ? "real" : kind->second)(told);
     const std::scoped_lock lock(mutex_);
     const std::string id = std::to_string(++count_);
-    const std::string address = server->address();
-    servers_[id] = std::move(server);
-    return id + " " + address;
+    const std::string said = id + " " + opened.address;
+    servers_[id] = std::move(opened);
+    return said;
   }
   void close(const std::string& id) {
     const std::scoped_lock lock(mutex_);
     servers_.erase(id);
   }
-  InProcessServer& at(const std::string& id) {
-    const std::scoped_lock lock(mutex_);
-    return *servers_.at(id);
+  std::string ask(const std::string& id, const std::string& question) {
+    std::function<std::string()> answer;
+    {
+      const std::scoped_lock lock(mutex_);
+      answer = servers_.at(id).answers.at(question);
+    }
+    return answer();
   }
 
  private:
   std::mutex mutex_;
   int count_ = 0;
-  std::map<std::string, std::unique_ptr<InProcessServer>> servers_;
+  std::map<std::string, Opened> servers_;
 };
 
 int run(char** arguments) {
@@ -68,16 +97,12 @@ int main(int count, char** arguments) {
   const auto text = [](httplib::Response& response, const std::string& body) {
     response.set_content(body, "text/plain");
   };
-  const auto id_of = [](const httplib::Request& request) { return request.get_param_value("id"); };
-  control.Get("/open", [&](const auto& request, auto& response) {
-    text(response, servers.open(request.has_param("tls") ? Transport::kTls : Transport::kPlain));
+  control.Get("/open",
+              [&](const auto& request, auto& response) { text(response, servers.open(request.params)); });
+  control.Get("/close", [&](const auto& request, auto&) { servers.close(request.get_param_value("id")); });
+  control.Get("/([a-z]+)", [&](const auto& request, auto& response) {
+    text(response, servers.ask(request.get_param_value("id"), request.matches[1]));
   });
-  control.Get("/roots", [&](const auto& request, auto& response) {
-    text(response, servers.at(id_of(request)).root_certificates());
-  });
-  control.Get("/close", [&](const auto& request, auto&) { servers.close(id_of(request)); });
-  control.Get("/stop", [&](const auto& request, auto&) { servers.at(id_of(request)).stop(); });
-  control.Get("/start", [&](const auto& request, auto&) { servers.at(id_of(request)).start_again(); });
   const int port = control.bind_to_any_port("127.0.0.1");
   std::thread serving([&] { control.listen_after_bind(); });
   setenv("LPDEFORM_TEST_PORT", std::to_string(port).c_str(), 1);

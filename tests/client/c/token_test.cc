@@ -1,44 +1,25 @@
 // Bearer tokens through the C interface, on a server that asks for them.
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <filesystem>
-#include <fstream>
-#include <memory>
 #include <string>
 
 #include "client/c/lpdeform.h"
-#include "server/server.h"
 #include "tests/client/c/session_fixture.h"
-#include "tests/server/fixtures/token_maker.h"
 
 namespace lpdeform {
 namespace {
 
-/// A server that takes the tokens of one pair of keys.
 class CTokenTest : public testing::Test {
  protected:
-  CTokenTest()
-      : keys_(std::filesystem::temp_directory_path() / ("lpdeform-c-tokens-" + std::to_string(getpid()))) {
-    std::ofstream(keys_) << maker_.public_key();
-    ServerOptions options;
-    options.address = "127.0.0.1:0";
-    options.threads = 1;
-    options.token_keys_file = keys_;
-    server_ = Server::start(options).value();
+  CTokenTest() {
     error_.struct_size = sizeof error_;
     lpdeform_connection connection{};
     connection.struct_size = sizeof connection;
-    const std::string address = server_->address();
-    connection.address = address.c_str();
+    connection.address = address_.c_str();
     EXPECT_EQ(lpdeform_connect(&connection, &client_, &error_), LPDEFORM_OK) << error_.message;
   }
-
-  ~CTokenTest() override {
-    lpdeform_disconnect(client_);
-    std::filesystem::remove(keys_);
-  }
+  ~CTokenTest() override { lpdeform_disconnect(client_); }
 
   /// How a session of a triangle gets on: its state once it is no longer connecting, with the reason in error_.
   lpdeform_state open() {
@@ -55,9 +36,8 @@ class CTokenTest : public testing::Test {
     return state;
   }
 
-  const std::filesystem::path keys_;
-  TokenMaker maker_;
-  std::unique_ptr<Server> server_;
+  const client::TokenServer server_;
+  const std::string address_ = server_.address();
   lpdeform_client* client_ = nullptr;
   lpdeform_error error_{};
 };
@@ -69,8 +49,7 @@ TEST_F(CTokenTest, ATokenThatNoHeaderCanCarryIsRefusedAndNotRepeated) {
     EXPECT_EQ(std::string(error_.message).find("sec"), std::string::npos) << error_.message;
     lpdeform_connection connection{};
     connection.struct_size = sizeof connection;
-    const std::string address = server_->address();
-    connection.address = address.c_str();
+    connection.address = address_.c_str();
     connection.token = token.c_str();
     lpdeform_client* none = nullptr;
     EXPECT_EQ(lpdeform_connect(&connection, &none, &error_), LPDEFORM_INVALID_ARGUMENT);
@@ -88,7 +67,7 @@ TEST_F(CTokenTest, ATokenLetsInFromTheNextCallOn) {
   ASSERT_EQ(lpdeform_set_token(client_, "nonsense", &error_), LPDEFORM_OK);
   EXPECT_EQ(open(), LPDEFORM_STATE_REFUSED);
   EXPECT_STREQ(error_.reason, "TOKEN_INVALID");
-  ASSERT_EQ(lpdeform_set_token(client_, maker_.token_of("a game").c_str(), &error_), LPDEFORM_OK);
+  ASSERT_EQ(lpdeform_set_token(client_, server_.token().c_str(), &error_), LPDEFORM_OK);
   EXPECT_EQ(open(), LPDEFORM_STATE_LIVE) << error_.message;
 }
 
