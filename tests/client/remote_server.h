@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <string>
 
 namespace lpdeform::client {
@@ -23,7 +24,7 @@ class RemoteServer {
   std::string id_, address_;
 };
 
-// The classes of the same names in in_process_server.h and token_server.h, each behind Envoy.
+// The classes of the same names in in_process_server.h, token_server.h and lying_server.h, each behind Envoy.
 
 enum class Transport { kPlain, kTls };
 
@@ -40,6 +41,29 @@ class TokenServer : public RemoteServer {
  public:
   TokenServer() : RemoteServer("tokens") {}
   std::string token() const { return ask("token"); }
+};
+
+using Lies = std::map<std::string, int>;
+
+class LyingServer : public RemoteServer {
+ public:
+  explicit LyingServer(const Lies& lies) : RemoteServer("lies" + query_of(lies)) {}
+  void stop() { ask("stop"); }
+  int creations() const { return std::stoi(ask("creations")); }
+  int deletions() const { return std::stoi(ask("deletions")); }
+  int takings() const { return std::stoi(ask("takings")); }
+
+ private:
+  static std::string query_of(const Lies& lies) {
+    std::string query;
+    for (const auto& [name, number] : lies) query += "&" + name + "=" + std::to_string(number);
+    return query;
+  }
+};
+
+class SilentServer : public RemoteServer {
+ public:
+  SilentServer() : RemoteServer("silence") {}
 };
 
 }  // namespace lpdeform::client

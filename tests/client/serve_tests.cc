@@ -1,6 +1,7 @@
 // Servers behind Envoys for a test program of another system, which has remote_server.h:   serve_tests PROGRAM ARGUMENT...
 // Runs the program with LPDEFORM_TEST_PORT in its environment, and ends as it does. An argument "@server" is replaced by the
-// address of a server of its own.
+// address of a server of its own. On that port, /open?kind=KIND opens a server and answers with its number and address,
+// /QUESTION?id=NUMBER asks it, and /close?id=NUMBER closes it.
 
 #include <stdlib.h>
 #include <sys/wait.h>
@@ -14,6 +15,7 @@
 #include <thread>
 
 #include "tests/client/in_process_server.h"
+#include "tests/client/lying_server.h"
 #include "tests/client/token_server.h"
 
 #include <httplib.h>  // last: its headers define _res, a name that Eigen has
@@ -43,12 +45,31 @@ Opened open_with_tokens(const httplib::Params&) {
   return {server, server->address(), {{"token", [server] { return server->token(); }}}};
 }
 
+Opened open_lying(const httplib::Params& told) {
+  Lies lies;
+  for (const auto& [name, number] : told) {
+    if (name != "kind") lies[name] = std::stoi(number);
+  }
+  const auto server = std::make_shared<LyingServer>(lies);
+  return {server,
+          server->address(),
+          {{"stop", [server] { return server->stop(), ""; }},
+           {"creations", [server] { return std::to_string(server->creations()); }},
+           {"deletions", [server] { return std::to_string(server->deletions()); }},
+           {"takings", [server] { return std::to_string(server->takings()); }}}};
+}
+
+Opened open_silent(const httplib::Params&) {
+  const auto server = std::make_shared<SilentServer>();
+  return {server, server->address(), {}};
+}
+
 /// Servers by their numbers.
 class Servers {
  public:
   std::string open(const httplib::Params& told) {
     static const std::map<std::string, Opened (*)(const httplib::Params&)> kKinds{
-        {"real", open_real}, {"tokens", open_with_tokens}};
+        {"real", open_real}, {"tokens", open_with_tokens}, {"lies", open_lying}, {"silence", open_silent}};
     const auto kind = told.find("kind");
     Opened opened = kKinds.at(kind == told.end() ? "real" : kind->second)(told);
     const std::scoped_lock lock(mutex_);

@@ -6,5 +6,6 @@
 #include "tests/client/remote_server.h"
 #else
 #include "tests/client/in_process_server.h"
+#include "tests/client/lying_server.h"
 #include "tests/client/token_server.h"
 #endif
