@@ -94,7 +94,7 @@ class WebFront {
   std::string certificate_file() const { return folder_ + "/certificate.pem"; }
   std::string key_file() const { return folder_ + "/key.pem"; }
 
-  /// With RSA: Wine 8 refuses an ECDSA signature of which a number has fewer bytes than the key, about one in 128.
+  /// With RSA: Wine 8 refuses ECDSA signatures where a number has fewer bytes than the key.
   void make_certificate() const {
     const std::string command =
         "openssl req -x509 -newkey rsa:2048 -nodes -days 2 "
