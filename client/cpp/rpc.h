@@ -28,7 +28,7 @@ class DeformCall {
   virtual absl::Status finish() = 0;
 };
 
-/// The server's calls over one channel; hides what carries them: gRPC (rpc.cc) or gRPC-Web (web_rpc.cc), of which one is
+/// The server's calls over one channel; hides what carries them: gRPC (rpc.cc) or gRPC-Web (grpc_web/web_rpc.cc), of which one is
 /// linked. Thread-safe. Each call waits, unless its comment says otherwise for
 /// at most the call timeout (DeleteSession: two seconds), and ends with CANCELLED when `stop` is requested.
 class Rpc {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/cpp/grpc_web.h"
+#include "client/cpp/grpc_web/grpc_web.h"
 #include "core/base/check.h"
 
 namespace {

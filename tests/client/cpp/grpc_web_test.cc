@@ -1,6 +1,6 @@
 // How answers of gRPC-Web are read.
 
-#include "client/cpp/grpc_web.h"
+#include "client/cpp/grpc_web/grpc_web.h"
 
 #include <gtest/gtest.h>
 

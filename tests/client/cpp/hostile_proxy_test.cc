@@ -13,11 +13,11 @@
 #include <string>
 #include <thread>
 
-#include "client/cpp/grpc_web.h"
+#include "client/cpp/grpc_web/grpc_web.h"
+#include "client/cpp/grpc_web/web_calls.h"
+#include "client/cpp/grpc_web/web_deform_call.h"
+#include "client/cpp/grpc_web/web_inbox.h"
 #include "client/cpp/rpc.h"
-#include "client/cpp/web_calls.h"
-#include "client/cpp/web_deform_call.h"
-#include "client/cpp/web_inbox.h"
 
 namespace lpdeform::client {
 namespace {

@@ -1,4 +1,4 @@
-#include "client/cpp/web_origin.h"
+#include "client/cpp/grpc_web/web_origin.h"
 
 #include <gtest/gtest.h>
 

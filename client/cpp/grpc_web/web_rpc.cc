@@ -7,12 +7,12 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "client/cpp/grpc_web/web_calls.h"
+#include "client/cpp/grpc_web/web_deform_call.h"
+#include "client/cpp/grpc_web/web_inbox.h"
+#include "client/cpp/grpc_web/web_origin.h"
 #include "client/cpp/recovery.h"
 #include "client/cpp/tls_texts.h"
-#include "client/cpp/web_calls.h"
-#include "client/cpp/web_deform_call.h"
-#include "client/cpp/web_inbox.h"
-#include "client/cpp/web_origin.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
 

@@ -9,7 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/cpp/caller.h"
-#include "client/cpp/web_http.h"
+#include "client/cpp/grpc_web/web_http.h"
 #include "lpdeform/v1/service.pb.h"
 
 namespace lpdeform::client {

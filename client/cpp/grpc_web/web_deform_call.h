@@ -3,8 +3,8 @@
 #include <chrono>
 #include <memory>
 
+#include "client/cpp/grpc_web/web_calls.h"
 #include "client/cpp/rpc.h"
-#include "client/cpp/web_calls.h"
 
 namespace lpdeform::client {
 

@@ -1,4 +1,4 @@
-#include "client/cpp/web_calls.h"
+#include "client/cpp/grpc_web/web_calls.h"
 
 #include <algorithm>
 #include <condition_variable>
@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "client/cpp/grpc_web.h"
+#include "client/cpp/grpc_web/grpc_web.h"
 
 namespace lpdeform::client {
 namespace {

@@ -1,4 +1,4 @@
-#include "client/cpp/grpc_web.h"
+#include "client/cpp/grpc_web/grpc_web.h"
 
 #include <cstdint>
 

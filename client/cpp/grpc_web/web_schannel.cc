@@ -1,4 +1,4 @@
-#include "client/cpp/web_schannel.h"
+#include "client/cpp/grpc_web/web_schannel.h"
 
 #define SECURITY_WIN32
 #include <winsock2.h>  // before windows.h

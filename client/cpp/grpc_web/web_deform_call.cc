@@ -1,4 +1,4 @@
-#include "client/cpp/web_deform_call.h"
+#include "client/cpp/grpc_web/web_deform_call.h"
 
 #include <algorithm>
 #include <deque>
@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
+#include "client/cpp/grpc_web/web_inbox.h"
 #include "client/cpp/lease.h"
 #include "client/cpp/status_details.h"
-#include "client/cpp/web_inbox.h"
 #include "core/base/fault.h"
 #include "core/base/reasons.h"
 

@@ -1,4 +1,4 @@
-#include "client/cpp/web_http.h"
+#include "client/cpp/grpc_web/web_http.h"
 
 #include <curl/curl.h>
 
@@ -11,7 +11,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #ifdef _WIN32
-#include "client/cpp/web_schannel.h"
+#include "client/cpp/grpc_web/web_schannel.h"
 #else
 #include <unistd.h>
 #endif
