@@ -114,6 +114,10 @@ describe("a GLB file", () => {
       "Node 0 (“tube”) draws by EXT_mesh_gpu_instancing",
       (json) => (json.nodes[0].extensions = { EXT_mesh_gpu_instancing: {} }),
     ],
+    [
+      "The scene has no triangles that could be deformed, only what node 0 (“tube”) draws, which its scale flattens",
+      (json) => json.nodes.forEach((node: any) => (node.scale = [1, 0, 1])),
+    ],
     ["Accessor 0 reaches beyond", (json) => (json.accessors[0].byteOffset = 4)],
     ["Accessor 0 has 1000000000 elements", (json) => (json.accessors[0].count = 1e9)],
     ["Accessor 0 names none of", (json) => delete json.accessors[0].bufferView],
@@ -121,7 +125,10 @@ describe("a GLB file", () => {
       "“sparse” of accessor 0 has 9999 values",
       (json) => (json.accessors[0].sparse = { count: 9999, indices: { componentType: 5121 } }),
     ],
-    ["The scene has no triangles", (json) => json.meshes.forEach((mesh: any) => (mesh.primitives[0].mode = 1))],
+    [
+      "The scene has no triangles that could be deformed, only points and lines",
+      (json) => json.meshes.forEach((mesh: any) => (mesh.primitives[0].mode = 1)),
+    ],
     ["Node 0 (“tube”) is reached twice", (json) => (json.nodes[0].children = [0])],
     ["Node 0 (“tube”) names none of the 2 meshes", (json) => (json.nodes[0].mesh = 7)],
     ["a.glb is no glTF of version 2", (json) => (json.asset.version = "1.0")],

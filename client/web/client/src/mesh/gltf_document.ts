@@ -38,6 +38,7 @@ export function readGltfDocument(
     const named = nameOf(json, "buffers", k);
     const found = buffer["uri"] === undefined && k === 0 ? binary : bytesAt(buffer["uri"], beside);
     const length = wholeOf(buffer, "byteLength", 0, named);
+    if (!found && isData(buffer["uri"])) refuse(named, `of ${name} is a data URI that is not in base64`);
     if (!found) refuse(named, `of ${name} is not in the file; open it together with the glTF, or save it as GLB`);
     if (found.length < length) refuse(named, `of ${name} has ${found.length} bytes in place of ${length}`);
     return found.subarray(0, length);
