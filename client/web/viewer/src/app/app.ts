@@ -30,6 +30,7 @@ import { Pace } from "./pace.js";
 import { Editing } from "./editing.js";
 import type { Pane } from "./pane.js";
 import { Panes } from "./panes.js";
+import { panelIs } from "./sides.js";
 import type { Workbench } from "./workbench.js";
 
 /** The page's central object: the work, the view, the panes, and the loop that draws them. */
@@ -570,6 +571,7 @@ export class App implements Workbench {
     if (view.selected !== before.selected && view.alsoSelected === before.alsoSelected && view.alsoSelected.length > 0) {
       return this.view.set({ alsoSelected: [] }); // this is called again
     }
+    panelIs(view.isPanelOpen);
     if (view.isSplit !== before.isSplit) {
       if (view.isSplit && !this.#addSecondPane()) return;
       if (!view.isSplit) this.#panes.removeSecond();

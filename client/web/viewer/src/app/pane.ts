@@ -8,6 +8,7 @@ import { Matrix4 } from "three";
 import { type Ahead, aheadOf } from "../model/ahead.js";
 import { type Document, pField } from "../model/document.js";
 import { boundsOf, centroid, type Mesh } from "lpdeform-client/mesh/mesh";
+import { leastP, mostP } from "../model/exponent.js";
 import { Progress } from "../model/progress.js";
 import { pullOf } from "lpdeform-client/mesh/pull";
 import { cornersOf, type PointedOut } from "../model/pointed.js";
@@ -347,7 +348,7 @@ function coloured(
     case "distortion":
       return [distortion ?? 0, { low: 0, red, isLogarithmic: false }];
     case "p":
-      return [pField(document, p) ?? new Float32Array(count).fill(p), { low: 1, red: 10, isLogarithmic: true }];
+      return [pField(document, p) ?? new Float32Array(count).fill(p), { low: leastP, red: mostP, isLogarithmic: true }];
     case "stiffness":
       return [document.stiffness ?? new Float32Array(count).fill(1), { low: 0.01, red: 100, isLogarithmic: true }];
     default:

@@ -7,16 +7,21 @@ import { User } from "./user.js";
 
 let service: Service;
 let user: User;
+/** The same page under fingers, where what is pressed is larger. */
+let touching: User;
 
 beforeAll(async () => {
   service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
   user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
   await user.settled();
+  touching = await User.open(`${service.url}/?shape=bar&detail=coarse`, { hasTouch: true });
+  await touching.settled();
 });
 
 afterAll(async () => {
-  expect(user.errors).toEqual([]);
+  expect([...user.errors, ...touching.errors]).toEqual([]);
   await user.close();
+  await touching.close();
   await service.stop();
 });
 
@@ -26,6 +31,8 @@ const sizes: (readonly [number, number])[] = [
   [414, 896],
   [600, 960],
   [640, 360],
+  [667, 375],
+  [740, 360],
   [768, 1024],
   [844, 390],
   [932, 430],
@@ -45,6 +52,9 @@ const states = [false, true].flatMap((isSplit) =>
 /** Where room is little, these leave the pictures free. */
 const beside = [".topbar", ".rail", ".options", ".dock", ".panel", ".hint", ".legend"];
 const isLittle = (width: number, height: number) => (width <= 720 && width <= height) || (height <= 560 && height <= width);
+const little = sizes.filter(([width, height]) => isLittle(width, height));
+const drawn = ({ page }: User) =>
+  page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 
 /** What stands over the pictures or beside them, and must not meet. */
 const parts = [
@@ -141,24 +151,80 @@ it.each(sizes)("nothing covers the first shape at %d x %d, and the hint is there
     await user.ask(`app.startOver("${shape}", "coarse")`);
     await user.ask("app.view.set({ isSplit: false, isPanelOpen: false, tool: 'move' })");
     await user.until(`!document.querySelector(".hint").hidden`);
-    await user.page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
+    await drawn(user);
     await user.ask("app.fit()");
-    await user.page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
+    await drawn(user);
     const all = await user.page.evaluate(covering);
     if (all.length > 0) found[shape] = all;
   }
   expect(found).toEqual({});
 });
 
-it.each(sizes)("nothing covers anything at %d x %d", async (width, height) => {
-  await user.page.setViewportSize({ width, height });
-  await user.ask(`app.change({ ...window.__lpdeform.document(), secondP: 3 })`);
+/** Options of the tool that cannot be scrolled into sight and pressed there, by name. */
+function outOfReach(): string[] {
+  const options = document.querySelector(".options")!;
+  return [...options.querySelectorAll<HTMLElement>("button, select, input")].flatMap((control) => {
+    const pressed = control.closest<HTMLElement>("label") ?? control;
+    if (!pressed.checkVisibility()) return [];
+    pressed.scrollIntoView({ block: "center", inline: "center" });
+    const { left, right, top, bottom } = pressed.getBoundingClientRect();
+    const found = [left + 2, (left + right) / 2, right - 2].map((x) => document.elementFromPoint(x, (top + bottom) / 2));
+    return found.every((element) => pressed.contains(element)) ? [] : [control.ariaLabel ?? control.textContent];
+  });
+}
+
+const tools = ["move", "brush", "lasso", "box", "paint"];
+
+it.each(sizes)("every option of every tool is reached at %d x %d", async (width, height) => {
+  for (const one of [user, touching]) {
+    await one.page.setViewportSize({ width, height });
+    for (const tool of tools) {
+      await one.ask(`app.view.set({ isSplit: false, isPanelOpen: false, tool: "${tool}" })`);
+      await drawn(one);
+      expect(await one.page.evaluate(outOfReach)).toEqual([]);
+    }
+  }
+});
+
+it.each(little)("the picture has more than half of a telephone of %d x %d, with the options open", async (width, height) => {
+  for (const one of [user, touching]) {
+    await one.page.setViewportSize({ width, height });
+    for (const tool of tools) {
+      await one.ask(`app.view.set({ isSplit: false, isPanelOpen: false, tool: "${tool}" })`);
+      await drawn(one);
+      const box = (await one.page.locator("canvas.stage").first().boundingBox())!;
+      expect((box.width * box.height) / (width * height)).toBeGreaterThan(0.5);
+    }
+  }
+});
+
+const cases = [...sizes.map((size) => [...size, "a mouse"] as const), ...little.map((size) => [...size, "fingers"] as const)];
+
+it.each(cases)("nothing covers anything at %d x %d under %s", async (width, height, pointer) => {
+  const one = pointer === "fingers" ? touching : user;
+  await one.page.setViewportSize({ width, height });
+  await one.ask(`app.change({ ...window.__lpdeform.document(), secondP: 3 })`);
   const found: Record<string, string[]> = {};
   for (const state of states) {
-    await user.ask(`app.view.set(${JSON.stringify(state)})`);
-    await user.page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
-    const all = await user.page.evaluate(faults, [parts, isLittle(width, height) ? beside : []]);
+    await one.ask(`app.view.set(${JSON.stringify(state)})`);
+    await drawn(one);
+    const all = await one.page.evaluate(faults, [parts, isLittle(width, height) ? beside : []]);
     if (all.length > 0) found[JSON.stringify(state)] = all;
   }
   expect(found).toEqual({});
+});
+
+it.each([
+  [390, 844],
+  [768, 1024],
+  [844, 390],
+])("two pictures are called as they stand at %d x %d, with the panel and without", async (width, height) => {
+  await user.page.setViewportSize({ width, height });
+  for (const isPanelOpen of [true, false, true]) {
+    await user.ask(`app.view.set({ isSplit: true, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
+    await drawn(user);
+    const [first, second] = await Promise.all([0, 1].map((k) => user.page.locator(".pane").nth(k).boundingBox()));
+    const wanted = first!.y === second!.y ? ["left", "right"] : ["upper", "lower"];
+    expect(await user.page.locator(".p-name small").allTextContents()).toEqual(wanted);
+  }
 });
