@@ -60,6 +60,7 @@ export class App implements Workbench {
   readonly #panes = new Panes(
     {
       changed: () => this.requestDraw(),
+      resized: () => this.#panes.isAsFitted && this.fit(),
       status: () => this.#statusChanged(),
       report: (report) => this.#showReport(report),
       problem: (problem) => this.facts.set({ problem }),
@@ -435,7 +436,7 @@ export class App implements Workbench {
   }
 
   fit(): void {
-    for (const pane of this.panes) pane.fit(this.view.now.isYUp);
+    this.#panes.fit(this.view.now.isYUp);
   }
 
   /** Turns the view to some vertices of the mesh. */
@@ -575,7 +576,7 @@ export class App implements Workbench {
     if (view.isSplit !== before.isSplit) {
       if (view.isSplit && !this.#addSecondPane()) return;
       if (!view.isSplit) this.#panes.removeSecond();
-      this.fit();
+      queueMicrotask(() => this.fit()); // when the controls have what they show with two pictures
       this.#statusChanged();
       this.#documentChanged(performance.now());
       this.#needsMarks = true;

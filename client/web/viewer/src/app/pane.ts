@@ -8,6 +8,7 @@ import { Matrix4 } from "three";
 import { type Ahead, aheadOf } from "../model/ahead.js";
 import { type Document, pField } from "../model/document.js";
 import { boundsOf, centroid, type Mesh } from "lpdeform-client/mesh/mesh";
+import type { Box } from "../model/free_room.js";
 import { leastP, mostP } from "../model/exponent.js";
 import { Progress } from "../model/progress.js";
 import { pullOf } from "lpdeform-client/mesh/pull";
@@ -27,6 +28,8 @@ import { EnergyTrail } from "./energy_trail.js";
 
 export interface PaneWatcher {
   changed(): void;
+  /** The picture has another size. */
+  resized(): void;
   status(status: Status): void;
   report(report: MeshReport): void;
   problem(error: LpdeformError): void;
@@ -80,6 +83,7 @@ export class Pane {
     this.element.append(this.stage.canvas, this.overlay.element);
     const resized = new ResizeObserver(() => {
       this.#measure();
+      watcher.resized();
       watcher.changed();
     });
     resized.observe(this.element);
@@ -262,12 +266,12 @@ export class Pane {
     this.#isDirty = true;
   }
 
-  fit(isYUp: boolean): void {
+  fit(isYUp: boolean, covers: readonly Box[]): void {
     const { surface } = this.stage;
     if (!surface) return;
     this.#measure();
     this.#resize(true, 1);
-    this.stage.fit(surface, isYUp);
+    this.stage.fit(surface, isYUp, covers);
   }
 
   /** Near enough to see them, far enough to see where they are, and from outside. */
