@@ -55,6 +55,19 @@ describe("a GLB file", () => {
     expect(rewriteGlb(mesh, mesh.exact ?? mesh.positions)).toEqual(glb);
   });
 
+  it("keeps chunks that are unknown here, behind its own", async () => {
+    const own = Uint8Array.of(4, 0, 0, 0, ...new TextEncoder().encode("ACME"), 1, 2, 3, 4);
+    for (const tail of [own, Uint8Array.of(...own, ...own)]) {
+      const file = writeGlb({ ...documentOf(makeGlb(true)), chunks: tail });
+      expect((await faultsOf(file)).filter((fault) => !fault.startsWith("GLB_UNKNOWN_CHUNK_TYPE"))).toEqual([]);
+      const mesh = meshOf(file);
+      expect(rewriteGlb(mesh, mesh.positions)).toEqual(file);
+      expect(rewriteGlb(mesh, turned(mesh)).slice(-tail.length)).toEqual(tail);
+    }
+    const cut = writeGlb({ ...documentOf(makeGlb(true)), chunks: Uint8Array.of(9, 0, 0, 0, 1, 2) });
+    expect(rewriteGlb(meshOf(cut), meshOf(cut).positions)).toEqual(makeGlb(true)); // no chunk that is whole
+  });
+
   it("of one node comes back with other positions, and everything else to the last bit", async () => {
     const bare = makeGlb(true);
     const one = meshOf(bare);
