@@ -185,10 +185,10 @@ export class App implements Workbench {
   }
 
   #takeWelding(): void {
-    const { seams, welding } = derivedOf(this.mesh);
+    const { seams, looseCount, welding } = derivedOf(this.mesh);
     this.#seams = seams;
     this.view.set({ isWelded: welding.isOn, weldTolerance: welding.tolerance });
-    this.facts.set({ seamVertices: seams?.copyCount ?? 0 });
+    this.facts.set({ seamVertices: seams?.copyCount ?? 0, looseVertices: looseCount });
   }
 
   #openPanes(): void {

@@ -226,9 +226,11 @@ export class Files {
     this.app.view.set({ tool: "move", isYUp });
     const up = ` Shown with ${isYUp ? "y" : "z"} up, as it seems: “Y is up” in the panel turns it.`;
     const count = (mesh.positions.length / 3).toLocaleString("en");
-    const { seamVertices } = this.app.facts.now;
+    const { seamVertices, looseVertices } = this.app.facts.now;
     const welded = `, ${seamVertices.toLocaleString("en")} of them copies along seams, welded: the panel “Mesh” has a switch`;
-    this.app.notify(`${first()}${name}: ${count} vertices${seamVertices > 0 ? welded : ""}.${up}`);
+    const loose = ` Where ${looseVertices.toLocaleString("en")} vertices of its borders lie near others it comes apart, unless “Weld within” in the panel “Mesh” joins them.`;
+    const torn = looseVertices > 0 ? loose : "";
+    this.app.notify(`${first()}${name}: ${count} vertices${seamVertices > 0 ? welded : ""}.${torn}${up}`);
     return true;
   }
 
