@@ -191,7 +191,7 @@ class Rewriter {
     const std::size_t begin = buffer.size();
     for (const float value : values.reshaped<Eigen::RowMajor>()) append_little_endian(buffer, value);
     Json& views = out_.root["bufferViews"];
-    views.push_back({{"buffer", 0},
+    views.push_back({{"buffer", 0U},  // unsigned, as numbers of a file are
                      {"byteOffset", begin},
                      {"byteLength", buffer.size() - begin},
                      {"target", kVertexData}});

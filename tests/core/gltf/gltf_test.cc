@@ -435,6 +435,20 @@ TEST(Gltf, SeveralBuffersBecomeOneInAGlb) {
   EXPECT_EQ(binary_of(out).substr(json["bufferViews"].back()["byteOffset"], second.size()), second);
 }
 
+TEST(Gltf, NewValuesBesideSeveralBuffersAreInTheOneOfAGlb) {
+  MadeGltf made = rich_gltf();
+  const std::string second(16, '\x3e');
+  made.root["bufferViews"].push_back({{"buffer", 1}, {"byteLength", second.size()}});
+  made.root["buffers"] = {{{"byteLength", made.buffer.size()}},
+                          {{"byteLength", second.size()}, {"uri", data_uri("a/b", second)}}};
+  ordered_json& attributes = made.root["meshes"][0]["primitives"][0]["attributes"];
+  attributes["_OWN"] =
+      attributes["POSITION"];  // stays as it is, so that positions need an accessor of their own
+  const Gltf file = parsed(glb_bytes(made.root.dump(), made.buffer, {}));
+  const Points wanted = moved(file, 1);
+  EXPECT_TRUE(parsed(bytes_of(file, wanted)).mesh().vertices.isApprox(wanted, 1e-6));
+}
+
 TEST(Gltf, AMeshFromElsewhereBecomesAFileOfItsOwn) {
   const TriangleMesh mesh = make_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}});
   const auto file = Gltf::of_mesh(mesh);

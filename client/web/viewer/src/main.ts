@@ -14,7 +14,7 @@ import { legend } from "./ui/legend.js";
 import { messages } from "./ui/messages.js";
 import { sidePanel } from "./ui/sidepanel.js";
 import { startTheme } from "./ui/theme.js";
-import { toolbar } from "./ui/toolbar.js";
+import { toolOptions } from "./ui/toolbar.js";
 import { topbar } from "./ui/topbar.js";
 import { watchedHere, watchingPage } from "./ui/watching.js";
 
@@ -42,7 +42,7 @@ async function start(): Promise<void> {
   root.append(
     topbar(app, files, () => help.showModal()),
     app.stages,
-    toolbar(app),
+    toolOptions(app),
     legend(app),
     dock(app),
     messages(app, () => startOver()),

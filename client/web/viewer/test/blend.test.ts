@@ -31,5 +31,5 @@ it("at a value that is known, and beyond all, it is the shape there", () => {
 
 it("the values that are prepared are once each, and reach over the whole slider", () => {
   expect(new Set(blendPs).size).toBe(blendPs.length);
-  expect([Math.min(...blendPs), Math.max(...blendPs)]).toEqual([1, 10]);
+  expect([Math.min(...blendPs), Math.max(...blendPs)]).toEqual([1, 12]);
 });

@@ -84,12 +84,16 @@ describe("meshes", () => {
     [
       "a.ply",
       ply("element face 1", "property list double int vertex_indices", "end_header", "1e20 0"),
-      "A list of 100000000000000000000 in element “face” of a.ply, row 0",
+      "a.ply, line 6, face 0: a list of 100000000000000000000 cannot be read",
     ],
-    ["a.ply", ply("element face 1", "property list double int vertex_indices", "end_header", "-1 0"), "A list of -1"],
-    ["a.ply", ply("element face 1", "property list float int vertex_indices", "end_header", "2.5 0"), "A list of 2.5"],
-    ["a.ply", ply("element face 1", "property list float int vertex_indices", "end_header", "x 0"), "A list of NaN"],
-    ["a.ply", ply("element face 1", "property list uint int vertex_indices", "end_header", "4e9 0"), "a.ply ends too soon"],
+    ["a.ply", ply("element face 1", "property list double int vertex_indices", "end_header", "-1 0"), "a list of -1 cannot"],
+    ["a.ply", ply("element face 1", "property list float int vertex_indices", "end_header", "2.5 0"), "a list of 2.5 cannot"],
+    ["a.ply", ply("element face 1", "property list float int vertex_indices", "end_header", "x 0"), "a list of NaN cannot"],
+    [
+      "a.ply",
+      ply("element face 1", "property list uint int vertex_indices", "end_header", "4e9 0"),
+      "face 0 of 1: the file ends before",
+    ],
     [
       "a.off",
       "OFF\n1 1 0\n0 -2e18 0\n3 0 0 0\n",
@@ -119,10 +123,21 @@ describe("meshes", () => {
       "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4 0 1 2\n",
       "a.off, line 6, face 0: it says that it has 4 corners, and names 3",
     ],
+    ["a.obj", "v 0 0 0\nf 1 1 1.5\n", "a.obj, line 2: face 1 has the corner “1.5”; there are 1 vertices"],
     ["a.obj", "v 0 0 0\nf 1 1\n", "line 2: a face has 2 corners"],
     ["a.obj", "v 0 0 0\n", "has no faces"],
     ["a.obj", "", "has no vertices"],
-    ["a.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n", "ends too soon"],
+    [
+      "a.ply",
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 0 0\n2 0 0\n",
+      "a.ply, line 9, vertex 2 of 3: the file ends before it is whole",
+    ],
+    [
+      "a.ply",
+      "ply\r\nformat ascii 1.0\r\nelement vertex 2\r\nproperty float x\r\nproperty float y\r\nproperty float z\r\nend_header\r\n0 0 0\r\n\r\n1 nan 0\r\n",
+      "a.ply, line 10, vertex 1: a vertex has no three finite coordinates",
+    ],
+    ["a.stl", "solid\nvertex 0 0 0\nvertex 1 x 0\nvertex 0 1 0\n", "a.stl, line 3, triangle 0: a vertex has no three"],
     ["a.ply", "ply\nformat zip 1.0\nend_header\n", "format “zip”"],
     ["a.ply", "nothing", "no PLY header"],
     ["a.stl", "solid\nendsolid", "has no vertices"],
@@ -141,9 +156,16 @@ describe("meshes", () => {
     expect(() => builder.polygon([0, 1, 2], "a.off, face 2000")).toThrow("this page takes 2,000 triangles at most");
   });
 
+  it.each(["utf16le", "latin1"] as const)("in UTF-16 are refused by that name (%s)", (encoding) => {
+    const text = Buffer.from(encoding === "latin1" ? "\xfe\xff\0v" : "\ufeffv 0 0 0", encoding);
+    for (const name of ["a.obj", "a.off"]) expect(() => parseMesh(name, text)).toThrow(`${name} is in UTF-16`);
+  });
+
   it("cut short is refused", () => {
     expect(() => parseMesh("a.stl", writeStl(mesh).subarray(0, 300))).toThrow("ends too soon");
-    expect(() => parseMesh("a.ply", writePly(mesh, distortion, 1).subarray(0, 900))).toThrow("ends too soon");
+    expect(() => parseMesh("a.ply", writePly(mesh, distortion, 1).subarray(0, 900))).toThrow(
+      /a.ply, vertex \d+ of \d+: the file ends before/,
+    );
   });
 });
 
@@ -217,7 +239,7 @@ describe("a handle file", () => {
   const handles = (...list: object[]) => JSON.stringify({ handles: list });
   it.each([
     ["{", "not JSON"],
-    ["[]", "the handle file is not an object"],
+    ["[]", "In the handle file, the whole is not an object"],
     ['{"handles": [], "what": 1}', "“what”, which is not a key of it; known are handles, region, groups, mesh, note."],
     [
       handles({ name: "a", vertices: [0], rotation: [1, 0, 0], translate: [0, 0, 1] }),

@@ -55,6 +55,19 @@ describe("a GLB file", () => {
     expect(rewriteGlb(mesh, mesh.exact ?? mesh.positions)).toEqual(glb);
   });
 
+  it("keeps chunks that are unknown here, behind its own", async () => {
+    const own = Uint8Array.of(4, 0, 0, 0, ...new TextEncoder().encode("ACME"), 1, 2, 3, 4);
+    for (const tail of [own, Uint8Array.of(...own, ...own)]) {
+      const file = writeGlb({ ...documentOf(makeGlb(true)), chunks: tail });
+      expect((await faultsOf(file)).filter((fault) => !fault.startsWith("GLB_UNKNOWN_CHUNK_TYPE"))).toEqual([]);
+      const mesh = meshOf(file);
+      expect(rewriteGlb(mesh, mesh.positions)).toEqual(file);
+      expect(rewriteGlb(mesh, turned(mesh)).slice(-tail.length)).toEqual(tail);
+    }
+    const cut = writeGlb({ ...documentOf(makeGlb(true)), chunks: Uint8Array.of(9, 0, 0, 0, 1, 2) });
+    expect(rewriteGlb(meshOf(cut), meshOf(cut).positions)).toEqual(makeGlb(true)); // no chunk that is whole
+  });
+
   it("of one node comes back with other positions, and everything else to the last bit", async () => {
     const bare = makeGlb(true);
     const one = meshOf(bare);
@@ -114,6 +127,10 @@ describe("a GLB file", () => {
       "Node 0 (“tube”) draws by EXT_mesh_gpu_instancing",
       (json) => (json.nodes[0].extensions = { EXT_mesh_gpu_instancing: {} }),
     ],
+    [
+      "The scene has no triangles that could be deformed, only what node 0 (“tube”) draws, which its scale flattens",
+      (json) => json.nodes.forEach((node: any) => (node.scale = [1, 0, 1])),
+    ],
     ["Accessor 0 reaches beyond", (json) => (json.accessors[0].byteOffset = 4)],
     ["Accessor 0 has 1000000000 elements", (json) => (json.accessors[0].count = 1e9)],
     ["Accessor 0 names none of", (json) => delete json.accessors[0].bufferView],
@@ -121,7 +138,10 @@ describe("a GLB file", () => {
       "“sparse” of accessor 0 has 9999 values",
       (json) => (json.accessors[0].sparse = { count: 9999, indices: { componentType: 5121 } }),
     ],
-    ["The scene has no triangles", (json) => json.meshes.forEach((mesh: any) => (mesh.primitives[0].mode = 1))],
+    [
+      "The scene has no triangles that could be deformed, only points and lines",
+      (json) => json.meshes.forEach((mesh: any) => (mesh.primitives[0].mode = 1)),
+    ],
     ["Node 0 (“tube”) is reached twice", (json) => (json.nodes[0].children = [0])],
     ["Node 0 (“tube”) names none of the 2 meshes", (json) => (json.nodes[0].mesh = 7)],
     ["a.glb is no glTF of version 2", (json) => (json.asset.version = "1.0")],

@@ -7,6 +7,7 @@ import { parseMesh } from "lpdeform-client/mesh/read";
 import { type Mesh, polygonsOf } from "lpdeform-client/mesh/mesh";
 
 const bytes = (text: string) => new TextEncoder().encode(text);
+const text = (bytes: Uint8Array) => new TextDecoder().decode(bytes);
 
 /** A box without its lid, of quads and a pentagon, with all that engines put beside. */
 const file = `# made by hand
@@ -47,7 +48,7 @@ const lines = (text: string, key: string) => text.split("\n").filter((line) => l
 
 describe("an OBJ file that is saved again", () => {
   it("keeps texture coordinates, groups, materials, polygons, colours and the rest, line by line", () => {
-    const written = rewriteObj(read(), turned(at(read())));
+    const written = text(rewriteObj(read(), turned(at(read()))));
     const kept = (text: string) => text.split("\n").filter((line) => !/^(v|vn|f) |^ /.test(line));
     expect(kept(written)).toEqual(kept(file));
     expect(lines(written, "v")[0]).toBe("v 5 0 0 0.1 0.2 0.3");
@@ -61,14 +62,14 @@ describe("an OBJ file that is saved again", () => {
 
   it("has the positions that it is given, to the last bit, and the same faces", () => {
     const positions = turned(at(read()));
-    const again = parseMesh("box.obj", bytes(rewriteObj(read(), positions)));
+    const again = parseMesh("box.obj", rewriteObj(read(), positions));
     expect(at(again)).toEqual([...positions]);
     expect([again.faces, again.corners]).toEqual([read().faces, read().corners]);
     expect([...again.beside!].sort()).toEqual([...read().beside!].sort()); // normals come later in it
   });
 
   it("has normals that turn with the surface, hard edges staying hard", () => {
-    const written = rewriteObj(read(), turned(at(read())));
+    const written = text(rewriteObj(read(), turned(at(read()))));
     const normals = lines(written, "vn").map((line) => line.split(" ").slice(1).map(Number));
     const ofFaces = lines(written, "f").map((line) =>
       line
@@ -87,7 +88,7 @@ describe("an OBJ file that is saved again", () => {
   });
 
   it("is the same where nothing has moved, its normals too", () => {
-    const again = rewriteObj(read(), Float64Array.from(at(read())));
+    const again = text(rewriteObj(read(), Float64Array.from(at(read()))));
     for (const normal of lines(again, "vn").map((line) => line.split(" ").slice(1).map(Number))) {
       expect(normal.map((value) => Math.round(1e6 * value) / 1e6 + 0)).toSatisfy(
         (one: number[]) => one.join() === "0,0,-1" || one.join() === "0,-1,0",
@@ -97,7 +98,7 @@ describe("an OBJ file that is saved again", () => {
 
   it.each(["\r\n", "\r"])("may have lines that end in %j", (end) => {
     const mesh = parseMesh("box.obj", bytes(file.replaceAll("\n", end))) as Mesh & { obj: Uint8Array };
-    const written = rewriteObj(mesh, turned(at(read())));
+    const written = text(rewriteObj(mesh, turned(at(read()))));
     expect(written.replaceAll(end, "")).not.toMatch(/[\r\n]/);
     const again = parseMesh("box.obj", bytes(written));
     expect(at(again)).toEqual([...turned(at(read()))]);
@@ -105,11 +106,19 @@ describe("an OBJ file that is saved again", () => {
     expect([...again.beside!].sort()).toEqual([...read().beside!].sort());
   });
 
+  it("keeps names in whatever encoding they are, and the mark at its beginning", () => {
+    const every = Array.from({ length: 256 }, (_, byte) => byte).filter((byte) => ![10, 13, 92].includes(byte));
+    const parts = [[0xef, 0xbb, 0xbf], bytes("v 0 0 0\nv 1 0 0\nv 0 1 0\ng "), every, bytes("\nf 1 2 3\n")];
+    const obj = Uint8Array.from(parts.flatMap((part) => [...part]));
+    const mesh = parseMesh("a.obj", obj) as ReturnType<typeof read>;
+    expect(rewriteObj(mesh, mesh.positions)).toEqual(obj);
+  });
+
   it("keeps a normal where the surface has no direction", () => {
     const flat = parseMesh("a.obj", bytes("v 0 0 0\nv 1 0 0\nv 2 0 0\nvn 0 0 1\nf 1//1 2//1 3//1\n")) as ReturnType<
       typeof read
     >;
-    expect(lines(rewriteObj(flat, flat.positions), "vn")).toEqual(["vn 0 0 1", "vn 0 0 1", "vn 0 0 1"]);
+    expect(lines(text(rewriteObj(flat, flat.positions)), "vn")).toEqual(["vn 0 0 1", "vn 0 0 1", "vn 0 0 1"]);
   });
 });
 

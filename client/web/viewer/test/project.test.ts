@@ -153,7 +153,7 @@ describe("a project", () => {
 
   it.each<[string, (head: Record<string, any>) => void, string]>([
     ["version", (head) => (head["version"] = 2), "is a project of version 2; this page reads version 1"],
-    ["p", (head) => (head["p"] = 0.5), "p is 0.5, not a number from 1 to 10"],
+    ["p", (head) => (head["p"] = 0.5), "p is 0.5, not a number from 1 to 12"],
     ["second p", (head) => (head["secondP"] = null), "secondP is null"],
     ["automatic", (head) => (head["isAutomatic"] = 1), "“isAutomatic” is neither true nor false"],
     ["mesh", (head) => (head["mesh"] = null), "the mesh has no name"],

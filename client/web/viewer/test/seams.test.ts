@@ -1,4 +1,4 @@
-import { usualWelding } from "lpdeform-client/mesh/derived";
+import { derive, usualWelding } from "lpdeform-client/mesh/derived";
 import { expect, it } from "vitest";
 import { boundsOf, type Mesh } from "lpdeform-client/mesh/mesh";
 import { seamsOf } from "lpdeform-client/mesh/seams";
@@ -110,6 +110,24 @@ it("too many vertices within a large tolerance of each other are refused, as ser
   positions[0] = 1;
   const heap = { name: "heap", positions, faces: Uint32Array.of(0, 1, 2) };
   expect(() => seamsOf(heap, 1e-3)).toThrow(expect.objectContaining({ reason: "WELD_TOO_DENSE", element: "weld tolerance" }));
+});
+
+it.each([
+  [5e-7, 0],
+  [5e-6, 2 * (rows + 1)],
+  [5e-4, 2 * (rows + 1)],
+  [5e-3, 0],
+])("at %d of the size from each other, borders that look like one are told: %d vertices", (share, count) => {
+  const mesh = splitTube(columns, rows);
+  const { diagonal } = boundsOf(mesh.positions, mesh.faces);
+  const exact = Float64Array.from(mesh.positions);
+  for (let row = 0; row <= rows; ++row) exact[3 * (row * (columns + 1) + columns)]! += share * diagonal;
+  expect(derive({ ...mesh, exact }, usualWelding).looseCount).toBe(count);
+  expect(derive({ ...mesh, exact }, { tolerance: 1e-3, isOn: true }).looseCount).toBe(0);
+});
+
+it.each(shapeKinds.map(({ id, make }) => [id, make("medium").mesh] as const))("the shape %s has no such borders", (_, mesh) => {
+  expect(derive(mesh, usualWelding).looseCount).toBe(0);
 });
 
 it("surfaces that are closed, or whose borders lie apart, have none", () => {

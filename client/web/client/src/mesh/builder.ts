@@ -4,6 +4,11 @@ import { FileFault } from "./fault.js";
 /** Squares of distances then stay within the range of float32. */
 const mostCoordinate = 1e18;
 
+/** Where in a file something stands, or what says so if it is asked for. */
+export type Where = string | (() => string);
+
+const told = (where: Where) => (typeof where === "string" ? where : where());
+
 /** Assembles a mesh; polygons become fans of triangles. */
 export class MeshBuilder {
   readonly positions: number[] = [];
@@ -18,17 +23,17 @@ export class MeshBuilder {
     return this.positions.length / 3;
   }
 
-  vertex(x: number, y: number, z: number, where: string): void {
-    if (!Number.isFinite(x + y + z)) throw new FileFault(`${where}: a vertex has no three finite coordinates.`);
+  vertex(x: number, y: number, z: number, where: Where): void {
+    if (!Number.isFinite(x + y + z)) throw new FileFault(`${told(where)}: a vertex has no three finite coordinates.`);
     if (Math.max(Math.abs(x), Math.abs(y), Math.abs(z)) > mostCoordinate) {
-      throw new FileFault(`${where}: a vertex lies farther out than ${mostCoordinate}, which is not drawn.`);
+      throw new FileFault(`${told(where)}: a vertex lies farther out than ${mostCoordinate}, which is not drawn.`);
     }
     this.#checkCount(this.vertexCount + 1, "vertices", where);
     this.positions.push(x, y, z);
   }
 
-  polygon(corners: readonly number[], where: string): void {
-    if (corners.length < 3) throw new FileFault(`${where}: a face has ${corners.length} corners.`);
+  polygon(corners: readonly number[], where: Where): void {
+    if (corners.length < 3) throw new FileFault(`${told(where)}: a face has ${corners.length} corners.`);
     for (let k = 2; k < corners.length; ++k) this.faces.push(corners[0]!, corners[k - 1]!, corners[k]!);
     this.#corners.push(corners.length);
     this.#checkCount(this.faces.length / 3, "triangles", where);
@@ -46,9 +51,9 @@ export class MeshBuilder {
     return polygon;
   }
 
-  #checkCount(count: number, what: string, where: string): void {
+  #checkCount(count: number, what: string, where: Where): void {
     if (count <= this.most) return;
-    throw new FileFault(`${where}: this page takes ${this.most.toLocaleString("en")} ${what} at most.`);
+    throw new FileFault(`${told(where)}: this page takes ${this.most.toLocaleString("en")} ${what} at most.`);
   }
 
   /** `faceAt`: how to name a polygon of the file, by its index from 0; without it, by that index. */

@@ -6,7 +6,7 @@ import { drawnAt } from "./drawmesh.js";
 import { type Drawn, drawnOf } from "./drawn.js";
 import { faceOrder } from "./face_blocks.js";
 import { type Bounds, boundsOf, type Mesh } from "./mesh.js";
-import { type Seams, seamsOf, usualTolerance } from "./seams.js";
+import { looseVertices, type Seams, seamsOf, usualTolerance } from "./seams.js";
 import { guessYUp } from "./up.js";
 
 /** Which vertices count as one. */
@@ -51,6 +51,8 @@ export interface Shown {
 export interface Derived {
   welding: Welding;
   seams: Seams | undefined;
+  /** Vertices on open borders that are not one with others near them: see looseVertices(). */
+  looseCount: number;
   bounds: Bounds;
   /** The mean length of the edges, and the least. */
   edge: number;
@@ -98,16 +100,19 @@ export function derive(mesh: Mesh, welding: Welding): Derived {
   const own = adjacencyOf(positions.length / 3, faces);
   const welded = welding.isOn && seams?.faces;
   const drawn = drawnOf({ positions, faces: welded || faces });
+  const edge = meanEdge(own, positions);
+  const adjacency = welded ? adjacencyOf(positions.length / 3, welded) : own;
   const shown = {
-    adjacency: welded ? adjacencyOf(positions.length / 3, welded) : own,
+    adjacency,
     drawn,
     atRest: drawnAt(positions, drawn),
   };
   return {
     welding,
     seams,
+    looseCount: looseVertices(mesh, welded || faces, adjacency, edge),
     bounds: boundsOf(positions, faces),
-    edge: meanEdge(own, positions),
+    edge,
     shortestEdge: shortestEdge(own, positions),
     isYUp: guessYUp(mesh),
     order: faceOrder(positions, faces),

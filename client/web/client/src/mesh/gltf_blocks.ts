@@ -63,7 +63,8 @@ export function readBlocks(document: GltfDocument): DrawList {
   for (const node of worlds.keys()) {
     if (listOf(json, "nodes")[node]!["mesh"] !== undefined) readNode(document, node, worlds, list);
   }
-  if (list.faces.length === 0) refuse("the scene", "has no triangles that could be deformed");
+  const others = list.left.size > 0 ? `, only ${[...list.left].join(", ")}` : "";
+  if (list.faces.length === 0) refuse("the scene", `has no triangles that could be deformed${others}`);
   return list;
 }
 

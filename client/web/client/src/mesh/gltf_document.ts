@@ -7,6 +7,8 @@ export type Part = Record<string, unknown>;
 export interface GltfDocument {
   json: Part;
   buffer: Uint8Array;
+  /** What a GLB has after these: chunks that are unknown here, as they came. */
+  chunks?: Uint8Array;
 }
 
 const [magic, jsonChunk, binaryChunk] = [0x46546c67, 0x4e4f534a, 0x004e4942];
@@ -25,7 +27,7 @@ export function readGltfDocument(
   beside: ReadonlyMap<string, Uint8Array>,
 ): GltfDocument {
   const isGlb = bytes.length >= 4 && viewOf(bytes).getUint32(0, true) === magic;
-  const { text, binary } = isGlb ? chunksOf(name, bytes) : { text: bytes, binary: undefined };
+  const { text, binary, chunks } = isGlb ? chunksOf(name, bytes) : { text: bytes };
   let json: Part;
   try {
     json = JSON.parse(new TextDecoder().decode(text)) as Part;
@@ -38,16 +40,23 @@ export function readGltfDocument(
     const named = nameOf(json, "buffers", k);
     const found = buffer["uri"] === undefined && k === 0 ? binary : bytesAt(buffer["uri"], beside);
     const length = wholeOf(buffer, "byteLength", 0, named);
+    if (!found && isData(buffer["uri"])) refuse(named, `of ${name} is a data URI that is not in base64`);
     if (!found) refuse(named, `of ${name} is not in the file; open it together with the glTF, or save it as GLB`);
     if (found.length < length) refuse(named, `of ${name} has ${found.length} bytes in place of ${length}`);
     return found.subarray(0, length);
   });
-  const document = joined(json, buffers);
+  const document = { ...joined(json, buffers), ...(chunks && { chunks }) };
   putImagesIn(document, beside);
   return document;
 }
 
-function chunksOf(name: string, bytes: Uint8Array): { text: Uint8Array; binary: Uint8Array | undefined } {
+interface Chunks {
+  text: Uint8Array;
+  binary?: Uint8Array;
+  chunks?: Uint8Array;
+}
+
+function chunksOf(name: string, bytes: Uint8Array): Chunks {
   const view = viewOf(bytes);
   if (bytes.length < 20 || view.getUint32(4, true) !== 2) throw new FileFault(`${name} is no GLB of version 2.`);
   const length = view.getUint32(12, true);
@@ -57,22 +66,35 @@ function chunksOf(name: string, bytes: Uint8Array): { text: Uint8Array; binary: 
   if (view.getUint32(16, true) !== jsonChunk) throw new FileFault(`${name} does not begin with JSON.`);
   const text = bytes.subarray(20, 20 + length);
   const at = 28 + length;
-  if (at > bytes.length || view.getUint32(at - 4, true) !== binaryChunk) return { text, binary: undefined };
+  if (at > bytes.length || view.getUint32(at - 4, true) !== binaryChunk) return { text, ...othersFrom(at - 8, bytes) };
   const size = view.getUint32(at - 8, true);
   if (at + size > bytes.length) throw new FileFault(`${name} ends within its chunk BIN.`);
-  return { text, binary: bytes.subarray(at, at + size) };
+  return { text, binary: bytes.subarray(at, at + size), ...othersFrom(at + size, bytes) };
 }
 
-export function writeGlb({ json, buffer }: GltfDocument): Uint8Array<ArrayBuffer> {
+/** Chunks that are whole, up to the length that the file says. */
+function othersFrom(begin: number, bytes: Uint8Array): Pick<Chunks, "chunks"> {
+  const view = viewOf(bytes);
+  let end = begin;
+  for (let next = begin; next <= view.getUint32(8, true);) {
+    end = next;
+    if (next + 8 > bytes.length) break;
+    next += 8 + view.getUint32(next, true);
+  }
+  return end > begin ? { chunks: bytes.subarray(begin, end) } : {};
+}
+
+export function writeGlb({ json, buffer, chunks = new Uint8Array(0) }: GltfDocument): Uint8Array<ArrayBuffer> {
   const text = new TextEncoder().encode(JSON.stringify(json));
   const [textSize, bufferSize] = [aligned(text.length), aligned(buffer.length)];
-  const bytes = new Uint8Array(28 + textSize + bufferSize).fill(0x20, 20, 20 + textSize);
+  const bytes = new Uint8Array(28 + textSize + bufferSize + chunks.length).fill(0x20, 20, 20 + textSize);
   const view = viewOf(bytes);
   [magic, 2, bytes.length, textSize, jsonChunk].forEach((number, k) => view.setUint32(4 * k, number, true));
   bytes.set(text, 20);
   view.setUint32(20 + textSize, bufferSize, true);
   view.setUint32(24 + textSize, binaryChunk, true);
   bytes.set(buffer, 28 + textSize);
+  bytes.set(chunks, 28 + textSize + bufferSize);
   return bytes;
 }
 

@@ -21,7 +21,7 @@ const beside: Readonly<Record<string, string>> = {
 /** The positions and faces of an OBJ file. Other contents are only named. */
 export function readObj(name: string, text: string): Mesh {
   const builder = new MeshBuilder();
-  let [least, most] = [0, 0];
+  let [least, most, areWhole] = [0, 0, true];
   for (const { words, number } of logicalLines(text)) {
     const [key, ...values] = words;
     if (key === "v") {
@@ -31,13 +31,16 @@ export function readObj(name: string, text: string): Mesh {
     } else if (key === "f") {
       const corners = values.map((word) => cornerOf(word, builder.vertexCount));
       builder.polygon(corners, `${name}, line ${number}`);
-      for (const corner of corners) [least, most] = [Math.min(least, corner), Math.max(most, corner)];
+      for (const corner of corners) {
+        least = Math.min(least, corner);
+        most = Math.max(most, corner);
+        areWhole &&= Number.isInteger(corner);
+      }
     } else if (key !== undefined && Object.hasOwn(beside, key)) {
       builder.leftAside(beside[key]!);
     }
   }
-  // NaN fails, too.
-  if (!(least >= 0 && most < builder.vertexCount)) checkCorners(name, text, builder.vertexCount);
+  if (!(areWhole && least >= 0 && most < builder.vertexCount)) checkCorners(name, text, builder.vertexCount);
   return builder.finish(name);
 }
 

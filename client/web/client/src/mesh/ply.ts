@@ -40,13 +40,14 @@ const sizes: Record<string, number> = {
 /** PLY as text, or binary in either byte order. */
 export function readPly(name: string, bytes: Uint8Array): Mesh {
   const { format, elements, length } = readHeader(name, bytes);
-  const body = bytes.subarray(length);
-  const next =
-    format === "ascii" ? textReader(name, body) : binaryReader(name, body, format === "binary_little_endian");
+  const reader =
+    format === "ascii"
+      ? textReader(bytes, length)
+      : binaryReader(bytes.subarray(length), format === "binary_little_endian");
   const builder = new MeshBuilder();
   for (const element of elements) {
     for (const what of besideOf(element)) builder.leftAside(what);
-    for (let k = 0; k < element.count; ++k) readRow(name, element, k, next, builder);
+    for (let k = 0; k < element.count; ++k) readRow(name, element, k, reader, builder);
   }
   return builder.finish(name);
 }
@@ -105,20 +106,20 @@ function countOf(name: string, [element, count]: readonly string[]): number {
   throw new FileFault(`Element “${element}” of ${name} has the count “${count}”.`);
 }
 
-function readRow(
-  name: string,
-  element: Element,
-  row: number,
-  next: (type: string) => number,
-  builder: MeshBuilder,
-): void {
+function readRow(name: string, element: Element, row: number, reader: Reader, builder: MeshBuilder): void {
+  const where = (of = "") => `${name}${reader.place()}, ${element.name} ${row}${of}`;
+  const next = (type: string) => {
+    const value = reader.next(type);
+    if (value === undefined) throw new FileFault(`${where(` of ${element.count}`)}: the file ends before it is whole.`);
+    return value;
+  };
   const position = [NaN, NaN, NaN];
   let corners: number[] | undefined;
   for (const { name: property, type, lengthType } of element.properties) {
     if (lengthType) {
       const length = next(lengthType);
       if (!Number.isInteger(length) || length < 0 || length > mostInList) {
-        throw new FileFault(`A list of ${length} in element “${element.name}” of ${name}, row ${row}, cannot be read.`);
+        throw new FileFault(`${where()}: a list of ${length} cannot be read.`);
       }
       const list: number[] = [];
       while (list.length < length) list.push(next(type));
@@ -129,27 +130,45 @@ function readRow(
       if (axis >= 0) position[axis] = value;
     }
   }
-  if (element.name === "vertex") builder.vertex(position[0]!, position[1]!, position[2]!, `${name}, vertex ${row}`);
-  if (element.name === "face") builder.polygon(corners ?? [], `${name}, face ${row}`);
+  if (element.name === "vertex") builder.vertex(position[0]!, position[1]!, position[2]!, where);
+  if (element.name === "face") builder.polygon(corners ?? [], where);
 }
 
-function textReader(name: string, bytes: Uint8Array): () => number {
-  const words = new TextDecoder().decode(bytes).split(/\s+/);
-  let at = words[0] === "" ? 1 : 0;
-  return () => {
+/** The numbers of the rows, one after the other. */
+interface Reader {
+  /** Undefined at the end of the file. */
+  next(type: string): number | undefined;
+  /** Where the newest one stands: ", line 7"; nothing if the file has no lines. */
+  place(): string;
+}
+
+function textReader(bytes: Uint8Array, begin: number): Reader {
+  const toText = new TextDecoder();
+  const text = toText.decode(bytes.subarray(begin));
+  const words = text.split(/\s+/);
+  const first = words[0] === "" ? 1 : 0;
+  let at = first;
+  const next = () => {
     const word = words[at++];
-    if (word === undefined || word === "") throw new FileFault(`${name} ends too soon.`);
-    return Number(word);
+    return word === undefined || word === "" ? undefined : Number(word);
   };
+  const linesIn = (text: string) => text.split("\n").length - 1;
+  const place = () => {
+    let count = at - first;
+    let end = text.trimEnd().length;
+    for (const { index } of text.matchAll(/\S+/g)) if (--count === 0) end = index;
+    return `, line ${linesIn(toText.decode(bytes.subarray(0, begin))) + linesIn(text.slice(0, end)) + 1}`;
+  };
+  return { next, place };
 }
 
-function binaryReader(name: string, bytes: Uint8Array, littleEndian: boolean): (type: string) => number {
+function binaryReader(bytes: Uint8Array, littleEndian: boolean): Reader {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   let at = 0;
-  return (type) => {
+  const next = (type: string) => {
     const start = at;
     at += sizes[type]!;
-    if (at > view.byteLength) throw new FileFault(`${name} ends too soon.`);
+    if (at > view.byteLength) return undefined;
     switch (type) {
       case "char":
       case "int8":
@@ -176,4 +195,5 @@ function binaryReader(name: string, bytes: Uint8Array, littleEndian: boolean): (
         return view.getFloat64(start, littleEndian);
     }
   };
+  return { next, place: () => "" };
 }

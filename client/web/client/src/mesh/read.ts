@@ -1,4 +1,5 @@
 import type { Mesh } from "./mesh.js";
+import { utf16Of } from "./encodings.js";
 import { FileFault } from "./fault.js";
 import { readGltf } from "./gltf.js";
 import { readObj } from "./obj.js";
@@ -16,9 +17,9 @@ export function parseMesh(name: string, bytes: Uint8Array, beside?: ReadonlyMap<
     case "gltf":
       return readGltf(name, bytes, beside);
     case "off":
-      return readOff(name, text(bytes));
+      return readOff(name, textOf(name, bytes));
     case "obj":
-      return { ...readObj(name, text(bytes)), obj: bytes, ...materialsIn(beside) };
+      return { ...readObj(name, textOf(name, bytes)), obj: bytes, ...materialsIn(beside) };
     case "ply":
       return readPly(name, bytes);
     case "stl":
@@ -33,6 +34,7 @@ function materialsIn(beside: ReadonlyMap<string, Uint8Array> = new Map()): Pick<
   return files.some(([name]) => /\.mtl$/i.test(name)) ? { materials: Object.fromEntries(files) } : {};
 }
 
-function text(bytes: Uint8Array): string {
+function textOf(name: string, bytes: Uint8Array): string {
+  if (utf16Of(bytes)) throw new FileFault(`${name} is in UTF-16; save it as UTF-8.`);
   return new TextDecoder().decode(bytes);
 }

@@ -1,5 +1,5 @@
 import { LpdeformError } from "../errors.js";
-import { distance } from "./adjacency.js";
+import { type Adjacency, distance } from "./adjacency.js";
 import { boundsOf, type Mesh } from "./mesh.js";
 import { Pairs } from "./pairs.js";
 
@@ -69,6 +69,28 @@ export function seamsOf(mesh: Mesh, tolerance: number): Seams | undefined {
   return isAny ? Seams.of(groups, mesh.faces) : undefined;
 }
 
+/** What lies near is within this share of the diagonal, and of the mean edge. */
+const [nearDiagonal, nearEdge] = [1e-3, 0.1];
+
+/**
+ * How many vertices on open borders lie near others there with which they share no edge: the surface looks whole there, and tears.
+ * `faces`: the mesh's, welded or not; `edge`: the mean edge.
+ */
+export function looseVertices(mesh: Mesh, faces: Uint32Array, { starts, neighbours }: Adjacency, edge: number): number {
+  const positions = mesh.exact ?? mesh.positions;
+  const border = borderVertices(faces);
+  const { diagonal } = boundsOf(positions, faces);
+  const places = new Places(positions, Math.min(nearDiagonal * diagonal, nearEdge * edge), cellShare * diagonal);
+  const loose = new Set<number>();
+  for (const vertex of border) {
+    if (places.distances > mostDistances * border.length) break; // that many are near each other
+    const own = new Set(neighbours.subarray(starts[vertex]!, starts[vertex + 1]!));
+    for (const other of places.near(vertex)) if (!own.has(other)) loose.add(vertex).add(other);
+    places.add(vertex);
+  }
+  return loose.size;
+}
+
 type Numbers = Float32Array | Float64Array;
 
 function joinBorders(mesh: Mesh, tolerance: number, groups: Uint32Array): boolean {
@@ -122,8 +144,19 @@ function tooDense(tolerance: number): LpdeformError {
   );
 }
 
+/** By faces, which are asked for more than once. */
+const borders = new WeakMap<Uint32Array, readonly number[]>();
+
 /** The vertices of edges that belong to one face only, ascending. */
-function borderVertices(faces: Uint32Array): number[] {
+function borderVertices(faces: Uint32Array): readonly number[] {
+  const before = borders.get(faces);
+  if (before) return before;
+  const border = findBorder(faces);
+  borders.set(faces, border);
+  return border;
+}
+
+function findBorder(faces: Uint32Array): number[] {
   const counts = new Pairs(faces.length); // 1, or 2 for more
   const forEachEdge = (visit: (low: number, high: number) => void) => {
     for (let corner = 0; corner < faces.length; ++corner) {

@@ -35,7 +35,9 @@ function readText(bytes: Uint8Array, welder: Welder): void {
   const text = new TextDecoder().decode(bytes);
   if ((text.match(/^\s*solid\b/gm) ?? []).length > 1) welder.builder.leftAside("solids");
   const vertex = /vertex\s+(\S+)\s+(\S+)\s+(\S+)/g;
-  for (const [, x, y, z] of text.matchAll(vertex)) welder.corner(Number(x), Number(y), Number(z));
+  for (const { index, 1: x, 2: y, 3: z } of text.matchAll(vertex)) {
+    welder.corner(Number(x), Number(y), Number(z), () => `, line ${text.slice(0, index).split("\n").length}`);
+  }
   welder.end();
 }
 
@@ -46,13 +48,14 @@ class Welder {
 
   constructor(readonly name: string) {}
 
-  corner(x: number, y: number, z: number): void {
+  corner(x: number, y: number, z: number, place = () => ""): void {
     const key = `${x + 0} ${y + 0} ${z + 0}`; // + 0: -0 and 0 are the same place
     let vertex = this.#known.get(key);
     if (vertex === undefined) {
       vertex = this.builder.vertexCount;
       this.#known.set(key, vertex);
-      this.builder.vertex(x, y, z, `${this.name}, triangle ${this.builder.faces.length / 3}`);
+      const triangle = this.builder.faces.length / 3;
+      this.builder.vertex(x, y, z, () => `${this.name}${place()}, triangle ${triangle}`);
     }
     this.#face.push(vertex);
     if (this.#face.length === 3) this.builder.polygon(this.#face.splice(0), this.name);

@@ -30,6 +30,7 @@ import { Pace } from "./pace.js";
 import { Editing } from "./editing.js";
 import type { Pane } from "./pane.js";
 import { Panes } from "./panes.js";
+import { panelIs } from "./sides.js";
 import type { Workbench } from "./workbench.js";
 
 /** The page's central object: the work, the view, the panes, and the loop that draws them. */
@@ -59,6 +60,7 @@ export class App implements Workbench {
   readonly #panes = new Panes(
     {
       changed: () => this.requestDraw(),
+      resized: () => this.#panes.isAsFitted && this.fit(),
       status: () => this.#statusChanged(),
       report: (report) => this.#showReport(report),
       problem: (problem) => this.facts.set({ problem }),
@@ -183,10 +185,10 @@ export class App implements Workbench {
   }
 
   #takeWelding(): void {
-    const { seams, welding } = derivedOf(this.mesh);
+    const { seams, looseCount, welding } = derivedOf(this.mesh);
     this.#seams = seams;
     this.view.set({ isWelded: welding.isOn, weldTolerance: welding.tolerance });
-    this.facts.set({ seamVertices: seams?.copyCount ?? 0 });
+    this.facts.set({ seamVertices: seams?.copyCount ?? 0, looseVertices: looseCount });
   }
 
   #openPanes(): void {
@@ -434,7 +436,7 @@ export class App implements Workbench {
   }
 
   fit(): void {
-    for (const pane of this.panes) pane.fit(this.view.now.isYUp);
+    this.#panes.fit(this.view.now.isYUp);
   }
 
   /** Turns the view to some vertices of the mesh. */
@@ -570,10 +572,11 @@ export class App implements Workbench {
     if (view.selected !== before.selected && view.alsoSelected === before.alsoSelected && view.alsoSelected.length > 0) {
       return this.view.set({ alsoSelected: [] }); // this is called again
     }
+    panelIs(view.isPanelOpen);
     if (view.isSplit !== before.isSplit) {
       if (view.isSplit && !this.#addSecondPane()) return;
       if (!view.isSplit) this.#panes.removeSecond();
-      this.fit();
+      queueMicrotask(() => this.fit()); // when the controls have what they show with two pictures
       this.#statusChanged();
       this.#documentChanged(performance.now());
       this.#needsMarks = true;

@@ -32,6 +32,8 @@ export interface Facts {
   canRedo: boolean;
   /** Vertices that coincide with others along seams, welded or not. */
   seamVertices: number;
+  /** Vertices on open borders that lie near others and are not one with them. */
+  looseVertices: number;
 }
 
 export const noMesh: Mesh = { name: "", positions: new Float32Array(0), faces: new Uint32Array(0) };
@@ -51,4 +53,5 @@ export const firstFacts: Facts = {
   canUndo: false,
   canRedo: false,
   seamVertices: 0,
+  looseVertices: 0,
 };

@@ -16,6 +16,7 @@ import { sentence } from "../link/status.js";
 import type { Pane } from "./pane.js";
 import { pictureOf } from "./picture.js";
 import { openProject, saveProject } from "./projects.js";
+import { pressing } from "./touch.js";
 
 /** Time limit for the result that is exported. */
 const solveMs = 60_000;
@@ -86,6 +87,7 @@ export class Files {
 
   /** False if something else is opened in the meantime: then that is what the user wants. */
   async #openFile(file: File, files: readonly File[]): Promise<boolean> {
+    if (file.size === 0) throw new FileFault(`${file.name} is empty.`);
     checkSize(file.name, file.size);
     const done = file.size > largeBytes ? this.app.notifyWhile(`Opening ${file.name}…`) : () => undefined;
     try {
@@ -200,7 +202,7 @@ export class Files {
 
   saveHandles(): void {
     if (this.app.document.handles.length === 0) {
-      return this.app.notify("There are no handles to save: click the surface to place one.", true);
+      return this.app.notify(`There are no handles to save: ${pressing()} the surface to place one.`, true);
     }
     save(`${this.#stem}-handles.json`, writeHandleFile(this.app.document, this.app.mesh));
   }
@@ -224,9 +226,11 @@ export class Files {
     this.app.view.set({ tool: "move", isYUp });
     const up = ` Shown with ${isYUp ? "y" : "z"} up, as it seems: “Y is up” in the panel turns it.`;
     const count = (mesh.positions.length / 3).toLocaleString("en");
-    const { seamVertices } = this.app.facts.now;
+    const { seamVertices, looseVertices } = this.app.facts.now;
     const welded = `, ${seamVertices.toLocaleString("en")} of them copies along seams, welded: the panel “Mesh” has a switch`;
-    this.app.notify(`${first()}${name}: ${count} vertices${seamVertices > 0 ? welded : ""}.${up}`);
+    const loose = ` Where ${looseVertices.toLocaleString("en")} vertices of its borders lie near others it comes apart, unless “Weld within” in the panel “Mesh” joins them.`;
+    const torn = looseVertices > 0 ? loose : "";
+    this.app.notify(`${first()}${name}: ${count} vertices${seamVertices > 0 ? welded : ""}.${torn}${up}`);
     return true;
   }
 
@@ -238,7 +242,7 @@ export class Files {
     if (app.mesh !== mesh) return false;
     const { seams } = app;
     app.change(
-      readHandleFile(text, app.document, app.mesh, (vertices) => seams?.withCopies(vertices) ?? vertices),
+      naming(name, () => readHandleFile(text, app.document, app.mesh, (vertices) => seams?.withCopies(vertices) ?? vertices)),
       true,
     );
     app.view.set({ selected: app.document.handles.at(-1)!.name });
@@ -260,6 +264,16 @@ export class Files {
       classList.remove("dropping");
       void this.open([...(event.dataTransfer?.files ?? [])]);
     });
+  }
+}
+
+/** Puts the file's name before what is wrong with it. */
+function naming<Value>(name: string, read: () => Value): Value {
+  try {
+    return read();
+  } catch (error) {
+    if (!(error instanceof FileFault)) throw error;
+    throw new FileFault(`${name}: ${error.message}`);
   }
 }
 

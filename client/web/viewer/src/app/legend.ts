@@ -1,3 +1,4 @@
+import { leastP, mostP } from "../model/exponent.js";
 import { palettes } from "../model/palettes.js";
 import { short } from "../model/words.js";
 import type { App } from "./app.js";
@@ -9,7 +10,7 @@ export function legendOf(app: App): { title: string; low: string; middle: string
       if (app.red === 0) return { title: "Distortion", low: "none", middle: "", high: "" };
       return { title: "Distortion", low: "0", middle: short(app.red / 2), high: `≥ ${short(app.red)}` };
     case "p":
-      return { title: "p", low: "1", middle: "3.2", high: "10" };
+      return { title: "p", low: short(leastP), middle: short(Math.sqrt(leastP * mostP)), high: short(mostP) };
     case "stiffness":
       return { title: "Stiffness", low: "0.01", middle: "1", high: "100" };
     default:

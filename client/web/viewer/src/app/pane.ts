@@ -8,6 +8,8 @@ import { Matrix4 } from "three";
 import { type Ahead, aheadOf } from "../model/ahead.js";
 import { type Document, pField } from "../model/document.js";
 import { boundsOf, centroid, type Mesh } from "lpdeform-client/mesh/mesh";
+import type { Box } from "../model/free_room.js";
+import { leastP, mostP } from "../model/exponent.js";
 import { Progress } from "../model/progress.js";
 import { pullOf } from "lpdeform-client/mesh/pull";
 import { cornersOf, type PointedOut } from "../model/pointed.js";
@@ -26,6 +28,8 @@ import { EnergyTrail } from "./energy_trail.js";
 
 export interface PaneWatcher {
   changed(): void;
+  /** The picture has another size. */
+  resized(): void;
   status(status: Status): void;
   report(report: MeshReport): void;
   problem(error: LpdeformError): void;
@@ -79,6 +83,7 @@ export class Pane {
     this.element.append(this.stage.canvas, this.overlay.element);
     const resized = new ResizeObserver(() => {
       this.#measure();
+      watcher.resized();
       watcher.changed();
     });
     resized.observe(this.element);
@@ -261,12 +266,12 @@ export class Pane {
     this.#isDirty = true;
   }
 
-  fit(isYUp: boolean): void {
+  fit(isYUp: boolean, covers: readonly Box[]): void {
     const { surface } = this.stage;
     if (!surface) return;
     this.#measure();
     this.#resize(true, 1);
-    this.stage.fit(surface, isYUp);
+    this.stage.fit(surface, isYUp, covers);
   }
 
   /** Near enough to see them, far enough to see where they are, and from outside. */
@@ -347,7 +352,7 @@ function coloured(
     case "distortion":
       return [distortion ?? 0, { low: 0, red, isLogarithmic: false }];
     case "p":
-      return [pField(document, p) ?? new Float32Array(count).fill(p), { low: 1, red: 10, isLogarithmic: true }];
+      return [pField(document, p) ?? new Float32Array(count).fill(p), { low: leastP, red: mostP, isLogarithmic: true }];
     case "stiffness":
       return [document.stiffness ?? new Float32Array(count).fill(1), { low: 0.01, red: 100, isLogarithmic: true }];
     default:

@@ -3,6 +3,7 @@ import { capital } from "../model/words.js";
 import type { Status } from "../link/status.js";
 import type { Look, Stage } from "../stage/stage.js";
 import { Pane, type PaneWatcher } from "./pane.js";
+import { coversOf } from "./covers.js";
 import { placeOf, watchPlaces } from "./sides.js";
 
 /** What keys do in a picture, for screen readers. */
@@ -22,6 +23,7 @@ export class Panes {
   readonly element = document.createElement("div");
   readonly all: Pane[] = [];
   #turned: Pane | undefined;
+  #fitted = "";
 
   /** `added`: called when a pane is there, before its view can be changed. */
   constructor(
@@ -74,6 +76,21 @@ export class Panes {
     const pane = this.all.find(({ stage }) => stage.canvas === document.activeElement) ?? this.all[0]!;
     this.#turned = pane;
     change(pane.stage);
+  }
+
+  /** All from the same distance, at which the surface fits into each of them. */
+  fit(isYUp: boolean): void {
+    const covers = this.all.flatMap(({ element }) => coversOf(element)); // the same for all, so that they can be compared
+    for (const pane of this.all) pane.fit(isYUp, covers);
+    const far = ({ stage: { look } }: Pane) => Math.hypot(...look.position.map((value, axis) => value - look.target[axis]!));
+    const farthest = this.all.reduce((most, pane) => (far(pane) > far(most) ? pane : most));
+    for (const pane of this.all) if (pane !== farthest) pane.stage.lookAs(farthest.stage);
+    this.#fitted = JSON.stringify(farthest.stage.look);
+  }
+
+  /** Whether the user has left the view as fit() had it. */
+  get isAsFitted(): boolean {
+    return this.#fitted === JSON.stringify(this.all[0]!.stage.look);
   }
 
   lookFrom(look: Look): void {

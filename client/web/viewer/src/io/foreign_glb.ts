@@ -1,5 +1,6 @@
 import { LoadingManager, type Material, Mesh, MeshStandardMaterial, type MeshPhongMaterial, type Object3D } from "three";
 import { FileFault } from "lpdeform-client/mesh/fault";
+import { utf16Of } from "lpdeform-client/mesh/encodings";
 import { checkUnpackedFbx, checkUnpackedZip } from "./unpacked.js";
 
 // FBX, COLLADA and 3MF, as three.js reads them. They become a GLB, which is opened as any other, with names, colours, texture
@@ -40,7 +41,7 @@ const readers: Record<Kind, (bytes: Uint8Array<ArrayBuffer>) => Promise<Object3D
   },
   async dae(bytes) {
     const { ColladaLoader } = await import("three/addons/loaders/ColladaLoader.js");
-    const read = new ColladaLoader(nothingElse()).parse(new TextDecoder().decode(bytes), "");
+    const read = new ColladaLoader(nothingElse()).parse(xmlText(bytes), "");
     if (!read?.scene) throw new Error("its XML is broken");
     return read.scene;
   },
@@ -54,6 +55,11 @@ const readers: Record<Kind, (bytes: Uint8Array<ArrayBuffer>) => Promise<Object3D
   },
 };
 
+/** XML is in UTF-8, or in UTF-16 if it begins with the mark of that. */
+function xmlText(bytes: Uint8Array): string {
+  return new TextDecoder(utf16Of(bytes) ?? "utf-8").decode(bytes);
+}
+
 /** Every address that a file names is one without contents. */
 function nothingElse(): LoadingManager {
   return new LoadingManager().setURLModifier(() => "data:,");
@@ -62,7 +68,7 @@ function nothingElse(): LoadingManager {
 /** What the readers do not expect in a file is an error of the language, whose words are about their code. */
 function whyOf(error: Error): string {
   if (error instanceof TypeError || error instanceof RangeError) return "parts of it are missing or damaged";
-  return error.message || "it ends too soon";
+  return error.message.replace(/^THREE\.\w+: /, "").replace(/\.+$/, "") || "it ends too soon";
 }
 
 let readings = 0;

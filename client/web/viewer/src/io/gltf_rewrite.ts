@@ -46,7 +46,7 @@ class Rewriter {
     readonly positions: Numbers,
   ) {
     this.#source = readGltfDocument(mesh.name, mesh.gltf, new Map());
-    this.#out = { json: structuredClone(this.#source.json), buffer: this.#source.buffer.slice() };
+    this.#out = { ...this.#source, json: structuredClone(this.#source.json), buffer: this.#source.buffer.slice() };
     this.#blocks = readBlocks(this.#source).blocks;
     this.#places = new Places(this.#source, this.#blocks);
     this.#rest = mesh.exact ?? mesh.positions;

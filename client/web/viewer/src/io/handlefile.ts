@@ -41,8 +41,8 @@ export function readHandles(
   mesh: Mesh,
   withCopies = (vertices: number[]): number[] => vertices,
 ): Document {
-  const file = objectOf(json, "the handle file");
-  checkKeys(file, ["handles", "region", "groups", "mesh", "note"], "the handle file");
+  const file = objectOf(json, "the whole");
+  checkKeys(file, ["handles", "region", "groups", "mesh", "note"], "the whole");
   const vertexCount = mesh.positions.length / 3;
   let result: Document = { ...withoutPaint(document), handles: [], isAutomatic: false };
   for (const one of arrayOf(file["handles"], "“handles”")) result = withHandle(result, one, mesh);

@@ -1,17 +1,23 @@
 import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { cornerOf, indexOf, logicalLines } from "lpdeform-client/mesh/obj_lines";
+import { byteOrderMark, bytesOfText, byteText } from "./byte_text.js";
 import { type Numbers, NormalTurner } from "./turned_normals.js";
 
 /**
  * The OBJ file with new positions. All lines stay as they are except vertices (whatever follows their three numbers stays) and
- * normals, which turn with the surface. Several vertices may share a normal, so each pair gets a normal of its own.
+ * normals, which turn with the surface; names stay in the encoding that they have. Several vertices may share a normal, so each pair gets a normal of its own.
  */
-export function rewriteObj({ obj, positions: drawn, exact, faces }: Mesh & { obj: Uint8Array }, positions: Numbers): string {
+export function rewriteObj(
+  { obj, positions: drawn, exact, faces }: Mesh & { obj: Uint8Array },
+  positions: Numbers,
+): Uint8Array<ArrayBuffer> {
   const turner = new NormalTurner(exact ?? drawn, positions, faces);
   const normals: number[][] = [];
   const pairs = new Map<string, number>();
   const newNormals: string[] = [];
-  const source = new TextDecoder().decode(obj);
+  const whole = byteText(obj);
+  const mark = whole.startsWith(byteOrderMark) ? byteOrderMark : "";
+  const source = whole.slice(mark.length);
   const separator = source.includes("\n") ? "\n" : "\r";
   const before = source.includes("\r\n") ? "\r" : "";
   const out: string[] = [];
@@ -51,7 +57,7 @@ export function rewriteObj({ obj, positions: drawn, exact, faces }: Mesh & { obj
     }
   }
   if (firstFace !== undefined) out.splice(firstFace, 1, ...newNormals);
-  return out.join(separator);
+  return bytesOfText(mark + out.join(separator));
 }
 
 /** Enough digits for a direction. */

@@ -5,7 +5,7 @@ export interface Shape {
 }
 
 /** The values of p that are prepared, in the order in which they are solved: from 2 down, and then up. */
-export const blendPs: readonly number[] = [2, 1.75, 1.5, 1.25, 1.1, 1, 2.5, 3, 4, 6, 8, 10];
+export const blendPs: readonly number[] = [2, 1.75, 1.5, 1.25, 1.1, 1, 2.5, 3, 4, 6, 8, 12];
 
 /** A shape, and the prepared values of p that it is between; they are the same if it is one of those. */
 export interface Blended {

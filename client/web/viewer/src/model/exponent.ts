@@ -1,5 +1,5 @@
 /** The range of the slider of p. */
-export const [leastP, mostP] = [1, 10];
+export const [leastP, mostP] = [1, 12];
 
 /** `p` plus a step, rounded to hundredths and within the slider's range. */
 export function steppedP(p: number, step: number): number {

@@ -2,6 +2,7 @@ import * as three from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { derivedOf } from "lpdeform-client/mesh/derived";
 import { boundsOf, type Mesh, type Vector3 } from "lpdeform-client/mesh/mesh";
+import { type Box, freeRoom } from "../model/free_room.js";
 import { Backdrop } from "./backdrop.js";
 import { Highlight } from "./highlight.js";
 import { LateGizmo } from "./late_gizmo.js";
@@ -17,20 +18,14 @@ export interface Look {
   target: Vector3;
 }
 
+/** A surface that nothing covers is at most so many times as far away as one that fills the picture. */
+const mostFar = 2.5;
+
 /** Height of a picture on which marks have their full size; on smaller pictures they would hide the surface. */
 const fullSizeHeight = 700;
 
 /** Of a picture at rest that the processor draws; more would take seconds. */
 const mostPixels = 16e6;
-
-/** Where small.css puts the controls beside the pictures. */
-const littleRoom = "(max-aspect-ratio: 1/1) and (max-width: 720px), (min-aspect-ratio: 1/1) and (max-height: 560px)";
-
-/** The pixels that the page's controls cover at the edges of a picture of this width. */
-function coveredAt(width: number): { left: number; top: number; bottom: number } {
-  if (matchMedia(littleRoom).matches) return { left: 0, top: 48, bottom: 16 };
-  return width > 620 ? { left: 70, top: 98, bottom: 120 } : { left: 40, top: 110, bottom: 165 };
-}
 
 /** One picture of a surface: canvas, camera, and what is drawn. It draws only when it is told to. */
 export class Stage {
@@ -53,6 +48,8 @@ export class Stage {
   readonly #replaced: Surface[] = [];
   #pixelRatio = 0;
   #size = [0, 0];
+  /** How much of the picture counts as covered at each edge, in CSS pixels. */
+  #covered: Box = { left: 0, top: 0, right: 0, bottom: 0 };
 
   constructor(readonly changed: () => void) {
     this.canvas.className = "stage";
@@ -149,7 +146,7 @@ export class Stage {
   }
 
   /** Shows everything, from the front and a little above. */
-  fit({ positions, mesh }: Surface, isYUp: boolean): void {
+  fit({ positions, mesh }: Surface, isYUp: boolean, covers: readonly Box[]): void {
     const isAtRest = positions === mesh.positions;
     const { min, max, center, diagonal } = isAtRest ? derivedOf(mesh).bounds : boundsOf(positions, mesh.faces);
     const away = isYUp ? new three.Vector3(0.62, 0.42, 1) : new three.Vector3(0.62, -1, 0.42);
@@ -159,7 +156,13 @@ export class Stage {
     camera.position.copy(away.normalize());
     camera.lookAt(0, 0, 0);
     this.target.set(...center);
-    camera.position.copy(this.target).addScaledVector(away, this.#distanceFor(min, max, center));
+    const distanceIn = (part: Box) => this.#distanceFor(min, max, center, part);
+    const [right, bottom] = this.#size as [number, number];
+    const whole = { left: 0, top: 0, right, bottom };
+    const free = freeRoom(whole, covers, (part) => -distanceIn(part));
+    this.#covered = { left: free.left, top: free.top, right: right - free.right, bottom: bottom - free.bottom };
+    this.#center();
+    camera.position.copy(this.target).addScaledVector(away, Math.min(distanceIn(free), mostFar * distanceIn(whole)));
     camera.near = diagonal / 200;
     camera.far = diagonal * 100;
     camera.updateProjectionMatrix();
@@ -170,13 +173,12 @@ export class Stage {
   /**
    * The distance at which a box fits into the free part of the picture, seen from `place` in the camera's present direction.
    */
-  #distanceFor(min: Vector3, max: Vector3, place: Vector3): number {
+  #distanceFor(min: Vector3, max: Vector3, place: Vector3, free = this.#free): number {
     const camera = this.#camera;
-    const [width, height] = this.#size as [number, number];
-    const covered = coveredAt(width);
+    const height = Math.max(this.#size[1]!, 1);
     const tangent = Math.tan((camera.fov * Math.PI) / 360);
-    const across = (tangent * Math.max(width - covered.left - 40, 0.4 * width)) / Math.max(height, 1);
-    const up = (tangent * Math.max(height - covered.top - covered.bottom, 0.4 * height)) / Math.max(height, 1);
+    const across = (tangent * Math.max(free.right - free.left - 40, 1)) / height;
+    const up = (tangent * Math.max(free.bottom - free.top, 1)) / height;
     const turn = camera.quaternion.clone().invert();
     let far = 0;
     for (let corner = 0; corner < 8; ++corner) {
@@ -275,7 +277,8 @@ export class Stage {
     this.#camera.far = other.#camera.far;
     this.#camera.zoom = other.#camera.zoom;
     this.target.copy(other.target);
-    this.#camera.updateProjectionMatrix();
+    this.#covered = other.#covered;
+    this.#center();
   }
 
   /**
@@ -291,13 +294,25 @@ export class Stage {
     this.#renderer.setPixelRatio(ratio);
     this.#renderer.setSize(width, height, false);
     this.#camera.aspect = width / Math.max(height, 1);
-    const covered = coveredAt(width);
-    this.#camera.setViewOffset(width, height, -covered.left / 2, (covered.bottom - covered.top) / 2, width, height);
+    this.#center();
     const scale = ratio * Math.min(Math.max(height / fullSizeHeight, 0.6), 1);
     this.marks.scale(scale);
     this.pointed.scale(scale);
     this.highlight.resize(width, height);
     return true;
+  }
+
+  /** The middle of what is looked at is drawn in the middle of what is not covered. */
+  #center(): void {
+    const [width, height] = this.#size as [number, number];
+    const { left, top, right, bottom } = this.#covered;
+    this.#camera.setViewOffset(width, height, (right - left) / 2, (bottom - top) / 2, width, height);
+  }
+
+  get #free(): Box {
+    const [width, height] = this.#size as [number, number];
+    const { left, top, right, bottom } = this.#covered;
+    return { left, top, right: width - right, bottom: height - bottom };
   }
 
   darken(isDark: boolean): void {

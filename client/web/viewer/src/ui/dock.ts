@@ -8,7 +8,7 @@ import { numberField } from "./number_field.js";
 
 /** The values in the paper's figures. */
 const stops = [1, 1.5, 2, 6] as const;
-/** Low values take most of the slider, because they differ most: share = log(p) / log(10). */
+/** Low values take most of the slider, because they differ most: share = log(p) / log(12). */
 export function shareOf(p: number): number {
   return Math.log(p / leastP) / Math.log(mostP / leastP);
 }

@@ -1,5 +1,6 @@
 import type { Hold } from "lpdeform-client";
 import type { App } from "../app/app.js";
+import { pressing } from "../app/touch.js";
 import { changeHandle, type Handle, handleOf } from "../model/document.js";
 import { type HoldKind, holdKinds, kindOf } from "../model/hold_kinds.js";
 import type { Vector3 } from "lpdeform-client/mesh/mesh";
@@ -14,7 +15,7 @@ import { poseFields } from "./pose_fields.js";
 /** The handles with their names and colours, and the settings of the selected handle. */
 export function handlesPanel(app: App): HTMLElement {
   const list = el("ul", { className: "handles" });
-  const none = el("li", { className: "empty" }, "None yet: click the surface.");
+  const none = el("li", { className: "empty" }, `None yet: ${pressing()} the surface.`);
   const rows: HandleRow[] = [];
   const details = el("div", { className: "details" });
   let shown = "";

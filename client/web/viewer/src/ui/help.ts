@@ -8,7 +8,7 @@ const sections: readonly (readonly [string, readonly (readonly [string, string])
   [
     "Tools",
     [
-      ["1", "Move: drag a handle, click the surface for a new one"],
+      ["1", "Move: drag a handle, click or tap the surface for a new one"],
       ["2", "Brush: paint a handle"],
       ["3  4", "Lasso, box: draw around vertices"],
       ["5", "p brush: paint p or stiffness"],

@@ -1,8 +1,9 @@
 import type { Reason } from "lpdeform-client";
 import type { App } from "../app/app.js";
+import { pressing, touches } from "../app/touch.js";
 import { elementsIn, isPassing, notAnswering, sentence, type Status } from "../link/status.js";
-import { percent } from "../model/words.js";
-import { el, measured, setText } from "./dom.js";
+import { capital, percent } from "../model/words.js";
+import { el, setText } from "./dom.js";
 import { statusPill } from "./pill.js";
 import { pointOutNamed } from "./report.js";
 
@@ -30,7 +31,7 @@ export function messages(app: App, startOver: () => void): HTMLElement {
     again,
   );
   const notice = el("div", { className: "notice", role: "status", hidden: true });
-  const hint = measured(el("div", { className: "hint" }), "--hint-height");
+  const hint = el("div", { className: "hint" });
   const restored = restoredNote(app, startOver);
   const aside = asideNote(app);
   let element = "";
@@ -180,8 +181,6 @@ function ago(time: number): string {
   return minutes < 48 * 60 ? words.format(-Math.round(minutes / 60), "hour") : words.format(-Math.round(minutes / 1440), "day");
 }
 
-const touches = () => matchMedia("(pointer: coarse)").matches;
-
 /** A hint at the next step, until the user knows the page. */
 function hintOf(app: App): string {
   const { document, status } = app.facts.now;
@@ -193,7 +192,7 @@ function hintOf(app: App): string {
     return `Draw around a part of the surface; ${turning}`;
   }
   if (tool === "paint") return "Paint over the surface: low p gathers distortion, stiffness keeps it away";
-  if (document.handles.length === 0) return `${touches() ? "Tap" : "Click"} the surface to place a first handle`;
+  if (document.handles.length === 0) return `${capital(pressing())} the surface to place a first handle`;
   if (document.handles.length === 1) return "Place a second handle: one stays, the other is dragged";
   return app.history.canUndo ? "" : "Drag the coloured handle and watch the surface follow";
 }

@@ -56,7 +56,7 @@ export function reportPanel(app: App): HTMLElement {
   const tolerance = el("label", { className: "pair" }, el("span", {}, "Weld within"), reach);
   const seamBox = el("div", { className: "seams", hidden: true }, seams, weld.element, tolerance);
   const showSeams = () => {
-    const { seamVertices, report } = app.facts.now;
+    const { seamVertices, looseVertices, report } = app.facts.now;
     const { isWelded, weldTolerance } = app.view.now;
     const hasSeams = seamVertices > 0;
     weld.input.checked = isWelded;
@@ -64,13 +64,15 @@ export function reportPanel(app: App): HTMLElement {
     seamBox.hidden = !hasSeams && !((report?.boundaryLoops ?? 0) > 0); // nothing lies open
     weld.element.hidden = !hasSeams;
     tolerance.hidden = !isWelded;
-    seamBox.classList.toggle("torn", hasSeams && !isWelded);
-    if (!hasSeams) return setText(seams, "No vertices of its open borders lie on others.");
+    seamBox.classList.toggle("torn", (hasSeams && !isWelded) || looseVertices > 0);
+    const near = `Where ${looseVertices.toLocaleString("en")} vertices of its borders lie near others, it comes apart.`;
+    const loose = looseVertices > 0 && isWelded ? ` ${near}` : "";
+    if (!hasSeams) return setText(seams, `No vertices of its open borders lie on others.${loose}`);
     const copies = seamVertices === 1 ? "vertex lies on another" : "vertices lie on others";
     const fate = isWelded ? "They move as one." : "The surface tears there.";
-    setText(seams, `${seamVertices.toLocaleString("en")} ${copies} along seams of textures or normals. ${fate}`);
+    setText(seams, `${seamVertices.toLocaleString("en")} ${copies} along seams of textures or normals. ${fate}${loose}`);
   };
-  app.facts.watch(({ seamVertices, report }) => [seamVertices, report], showSeams);
+  app.facts.watch(({ seamVertices, looseVertices, report }) => [seamVertices, looseVertices, report], showSeams);
   app.view.watchAll(showSeams);
   const showReport = (report: MeshReport | undefined, { name }: Mesh) => {
     const defects = defectsOf(report);
@@ -83,7 +85,7 @@ export function reportPanel(app: App): HTMLElement {
     ];
     summary.textContent = parts ? `${name}: ${parts.join(", ")}.` : name;
     list.replaceChildren(...defects.map((defect) => warning(app, defect)));
-    const isTorn = app.facts.now.seamVertices > 0 && !app.seams;
+    const isTorn = (app.facts.now.seamVertices > 0 && !app.seams) || app.facts.now.looseVertices > 0;
     if (report && defects.length === 0 && !isTorn) list.append(el("li", { className: "good" }, "Nothing wrong with it."));
   };
   app.facts.watch(

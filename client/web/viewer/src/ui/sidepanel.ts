@@ -24,7 +24,8 @@ export function sidePanel(app: App): HTMLElement {
   app.facts.watch(
     ({ report }) => [report],
     ([report]) => {
-      const isSplit = report !== undefined && app.facts.now.seamVertices > 0 && !app.view.now.isWelded;
+      const { seamVertices, looseVertices } = app.facts.now;
+      const isSplit = report !== undefined && ((seamVertices > 0 && !app.view.now.isWelded) || looseVertices > 0);
       const count = warningsOf(report).length + (isSplit ? 1 : 0);
       mesh.classList.toggle("warned", count > 0);
       if (count > 0) mesh.open = true;

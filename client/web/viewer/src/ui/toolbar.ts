@@ -1,6 +1,7 @@
 import type { App } from "../app/app.js";
 import { paintFolds } from "../app/paint_folds.js";
 import { withoutPaint } from "../model/document.js";
+import { leastP, mostP } from "../model/exponent.js";
 import { nothing } from "../model/pointed.js";
 import type { PaintMode } from "../model/soft_paint.js";
 import type { GizmoMode, StrokeMode, Tool } from "../model/view.js";
@@ -18,8 +19,8 @@ const tools: readonly (readonly [Tool, IconName, string, string])[] = [
   ["paint", "paint", "p brush", "Paint p or stiffness onto the surface (5)"],
 ];
 
-/** The tools at the left edge, and next to them the settings of the chosen one. */
-export function toolbar(app: App): HTMLElement {
+/** The tools, at the left edge, or in the bar of a telephone that is held upright. */
+export function toolRail(app: App): HTMLElement {
   const buttons = tools.map(([tool, picture, label, title]) => {
     const element = el(
       "button",
@@ -35,11 +36,11 @@ export function toolbar(app: App): HTMLElement {
     if (tool !== "brush" && tool !== "paint") app.facts.set({ pointedOut: nothing });
   });
   const fit = button("fit", "Show all of it (F)", () => app.fit());
-  const rail = el("nav", { className: "rail", aria: { label: "Tools" } }, ...buttons, el("hr"), fit);
-  return measured(el("div", { className: "tools" }, rail, options(app)), "--tools-height");
+  return el("nav", { className: "rail", aria: { label: "Tools" } }, ...buttons, el("hr"), fit);
 }
 
-function options(app: App): HTMLElement {
+/** The settings of the chosen tool. */
+export function toolOptions(app: App): HTMLElement {
   const mode = choice<StrokeMode>(
     "What a stroke does",
     [
@@ -79,7 +80,7 @@ function options(app: App): HTMLElement {
   const soft = slider("Soft", 0, 1, 0.05, (softness) => app.view.set({ softness }));
   soft.element.title = "How much of the brush, from its edge, works less and less";
   const size = slider("Size", 0, 0.25, 0.005, (radius) => app.view.set({ radius }));
-  const p = slider("p", 1, 10, 0.1, (paintP) => app.view.set({ paintP }));
+  const p = slider("p", leastP, mostP, 0.1, (paintP) => app.view.set({ paintP }));
   const stiffness = slider("Stiffness", -2, 2, 0.05, (power) =>
     app.view.set({ paintStiffness: Number((10 ** power).toPrecision(2)) }),
   );
@@ -137,5 +138,5 @@ function options(app: App): HTMLElement {
     through.element.hidden = tool !== "lasso" && tool !== "box";
     through.input.checked = view.isThrough;
   });
-  return element;
+  return measured(element, "--options-height");
 }

@@ -6,8 +6,9 @@ import { icon, type IconName } from "./icons.js";
 import { menu } from "./menu.js";
 import { button } from "./controls.js";
 import { shareLink } from "./share.js";
+import { toolRail } from "./toolbar.js";
 
-/** The name, opening, undo, and actions on the whole work. */
+/** The name, opening, undo, actions on the whole work, and the tools. */
 export function topbar(app: App, files: Files, showHelp: () => void): HTMLElement {
   const shapes = el("select", { title: "A shape to begin with", aria: { label: "Shape" } });
   for (const { id, title } of shapeKinds) shapes.append(el("option", { value: id, textContent: title }));
@@ -67,6 +68,7 @@ export function topbar(app: App, files: Files, showHelp: () => void): HTMLElemen
     theme,
     button("help", "Help and shortcuts (?)", showHelp),
     panel,
+    toolRail(app),
   );
 }
 

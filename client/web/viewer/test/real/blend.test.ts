@@ -26,10 +26,13 @@ it("a slider passes through prepared shapes, says which are interpolated, and is
   const before = await shown();
   const said = user.page.locator(".blend p").last();
   const move = (p: number) =>
-    blend().evaluate((input: HTMLInputElement, share) => {
-      input.value = String(share);
-      input.dispatchEvent(new Event("input", { bubbles: true }));
-    }, Math.log10(p));
+    blend().evaluate(
+      (input: HTMLInputElement, share) => {
+        input.value = String(share);
+        input.dispatchEvent(new Event("input", { bubbles: true }));
+      },
+      Math.log(p) / Math.log(12),
+    );
   await move(6);
   expect(await said.textContent()).toBe("Solved at p = 6.");
   const at6 = await shown();

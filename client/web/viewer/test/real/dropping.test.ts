@@ -30,25 +30,13 @@ afterAll(async () => {
   rmSync(folder, { recursive: true, force: true });
 });
 
-/** As a file manager does: files over the page, then let go. */
 async function drop(files: Record<string, string | Uint8Array>): Promise<void> {
   const paths = Object.entries(files).map(([name, content]) => {
     const path = join(folder, name);
     writeFileSync(path, content);
     return path;
   });
-  const devtools = await user.page.context().newCDPSession(user.page);
-  for (const type of ["dragEnter", "dragOver", "drop"] as const) {
-    await devtools.send("Input.dispatchDragEvent", {
-      type,
-      x: 500,
-      y: 400,
-      data: { items: [], files: paths, dragOperationsMask: 1 },
-    });
-    if (type === "dragOver") await user.page.getByText("Drop a mesh, a project or a handle file").waitFor();
-  }
-  await devtools.detach();
-  await user.page.getByText("Drop a mesh, a project or a handle file").waitFor({ state: "hidden" });
+  await user.drop(...paths);
 }
 
 const isOpen = (name: string) => user.until(`window.__lpdeform.app.mesh.name === "${name}"`);

@@ -60,9 +60,9 @@ it("p is typed, within its range", async () => {
   await p.fill("3.25");
   await p.press("Enter");
   expect(await user.ask("document().p")).toBe(3.25);
-  await p.fill("11");
+  await p.fill("13");
   await p.press("Enter");
-  expect(await user.page.locator(".notice.bad").textContent()).toBe("Value of p is a number from 1 to 10.");
+  expect(await user.page.locator(".notice.bad").textContent()).toBe("Value of p is a number from 1 to 12.");
   expect([await user.ask("document().p"), await p.inputValue()]).toEqual([3.25, "3.25"]);
   await p.press("ArrowUp");
   expect(await user.ask("document().p")).toBe(3.26);

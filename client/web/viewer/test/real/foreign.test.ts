@@ -90,8 +90,12 @@ describe("the viewer", () => {
   });
 
   it.each([
-    ["a.fbx", "", "a.fbx cannot be read as FBX"],
-    ["a.fbx", "; FBX 6.1.0 project file\nFBXVersion: 6100\n", "a.fbx cannot be read as FBX"],
+    ["a.fbx", "", "a.fbx is empty."],
+    [
+      "a.fbx",
+      "; FBX 6.1.0 project file\nFBXVersion: 6100\n",
+      "a.fbx cannot be read as FBX: FBX version not supported, FileVersion: 6100.",
+    ],
     ["a.dae", "<COLLADA", "a.dae cannot be read as COLLADA: unclosed xml tag(s): COLLADA."],
     [
       "a.dae",

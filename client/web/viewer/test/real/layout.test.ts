@@ -7,16 +7,21 @@ import { User } from "./user.js";
 
 let service: Service;
 let user: User;
+/** The same page under fingers, where what is pressed is larger. */
+let touching: User;
 
 beforeAll(async () => {
   service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
   user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
   await user.settled();
+  touching = await User.open(`${service.url}/?shape=bar&detail=coarse`, { hasTouch: true });
+  await touching.settled();
 });
 
 afterAll(async () => {
-  expect(user.errors).toEqual([]);
+  expect([...user.errors, ...touching.errors]).toEqual([]);
   await user.close();
+  await touching.close();
   await service.stop();
 });
 
@@ -26,6 +31,8 @@ const sizes: (readonly [number, number])[] = [
   [414, 896],
   [600, 960],
   [640, 360],
+  [667, 375],
+  [740, 360],
   [768, 1024],
   [844, 390],
   [932, 430],
@@ -45,6 +52,9 @@ const states = [false, true].flatMap((isSplit) =>
 /** Where room is little, these leave the pictures free. */
 const beside = [".topbar", ".rail", ".options", ".dock", ".panel", ".hint", ".legend"];
 const isLittle = (width: number, height: number) => (width <= 720 && width <= height) || (height <= 560 && height <= width);
+const little = sizes.filter(([width, height]) => isLittle(width, height));
+const drawn = ({ page }: User) =>
+  page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 
 /** What stands over the pictures or beside them, and must not meet. */
 const parts = [
@@ -58,14 +68,41 @@ const parts = [
   ".banner",
   ".hint",
   ".notice",
+  ".restored",
+  ".aside",
+  ".better",
   ".panel",
 ];
 
+/** All that the page can have to say at once. */
+const messages = {
+  setAside: [
+    { id: 1, name: "bar" },
+    { id: 2, name: "a model with a long name.glb" },
+  ],
+  better: [0.07, 0.12],
+  notice: {
+    text: "my tube.glb: 221 vertices, 17 of them copies along seams, welded: the panel has a switch.",
+    isBad: true,
+    stays: true,
+  },
+  status: { kind: "away", title: "The server is away", text: "Your work is kept here. Reconnecting by itself…", element: "" },
+};
+const nothingSaid = { setAside: [], better: [] };
+
 /** Pairs that overlap by more than a pixel of rounding, and what is cut off by the window. */
 function faults([parts, beside]: readonly (readonly string[])[]): string[] {
+  /** Of messages, those that are scrolled out of their part of the page are not seen. */
+  const seen = (element: HTMLElement) => {
+    const { left, right, top, bottom } = element.getBoundingClientRect();
+    const isFixed = getComputedStyle(element).position === "fixed";
+    const within = isFixed ? undefined : element.closest(".messages")?.getBoundingClientRect();
+    const [highest, lowest] = [Math.max(top, within?.top ?? top), Math.min(bottom, within?.bottom ?? bottom)];
+    return { left, right, top: highest, bottom: lowest, width: right - left, height: Math.max(lowest - highest, 0) };
+  };
   const boxes = [".pane", ...parts!].flatMap((part) =>
     [...document.querySelectorAll<HTMLElement>(part)]
-      .map((element) => ({ part, element, box: element.getBoundingClientRect() }))
+      .map((element) => ({ part, element, box: seen(element) }))
       .filter(({ element, box }) => box.width * box.height > 0 && element.checkVisibility({ visibilityProperty: true })),
   );
   const found: string[] = [];
@@ -83,29 +120,32 @@ function faults([parts, beside]: readonly (readonly string[])[]): string[] {
   return found;
 }
 
-/** By how much what stands over the picture covers the shape that has just been opened, by name. */
+/** By how much what stands over the pictures covers the shape that has just been opened, by name. */
 function covering(): string[] {
   const { app, vertexOnPage } = (window as any).__lpdeform;
   const count = app.mesh.positions.length / 3;
-  const places: { x: number; y: number }[] = Array.from({ length: count }, (_, vertex) => vertexOnPage(vertex));
-  const shape = {
-    left: Math.min(...places.map(({ x }) => x)),
-    right: Math.max(...places.map(({ x }) => x)),
-    top: Math.min(...places.map(({ y }) => y)),
-    bottom: Math.max(...places.map(({ y }) => y)),
-  };
-  const pane = document.querySelector(".pane")!.getBoundingClientRect();
   const found: string[] = [];
-  if (shape.bottom - shape.top < 0.2 * pane.height) found.push("the shape is small");
-  if (shape.left < pane.left || shape.right > pane.right || shape.top < pane.top || shape.bottom > pane.bottom)
-    found.push("the shape is cut off");
-  for (const part of [".hint", ".legend", ".pill", ".rail", ".options", ".dock"]) {
-    const box = document.querySelector(part)!.getBoundingClientRect();
-    const within = (place: { x: number; y: number }) =>
-      place.x > box.left && place.x < box.right && place.y > box.top && place.y < box.bottom;
-    const covered = places.filter(within).length;
-    if (covered > 0) found.push(`${part} covers ${covered} of ${count} vertices`);
-  }
+  [...document.querySelectorAll(".pane")].forEach((element, k) => {
+    const places: { x: number; y: number }[] = Array.from({ length: count }, (_, vertex) => vertexOnPage(vertex, k));
+    const shape = {
+      left: Math.min(...places.map(({ x }) => x)),
+      right: Math.max(...places.map(({ x }) => x)),
+      top: Math.min(...places.map(({ y }) => y)),
+      bottom: Math.max(...places.map(({ y }) => y)),
+    };
+    const pane = element.getBoundingClientRect();
+    if (Math.max(shape.bottom - shape.top, shape.right - shape.left) < 0.2 * pane.height)
+      found.push(`the shape is small in ${k}`);
+    if (shape.left < pane.left || shape.right > pane.right || shape.top < pane.top || shape.bottom > pane.bottom)
+      found.push(`the shape is cut off in ${k}`);
+    for (const part of document.querySelectorAll(".hint, .legend, .pill, .rail, .options, .dock, .split ~ .dock > *")) {
+      const box = part.getBoundingClientRect();
+      const within = (place: { x: number; y: number }) =>
+        place.x > box.left && place.x < box.right && place.y > box.top && place.y < box.bottom;
+      const covered = places.filter(within).length;
+      if (covered > 0) found.push(`${part.className} covers ${covered} of ${count} vertices in ${k}`);
+    }
+  });
   return found;
 }
 
@@ -134,31 +174,118 @@ it.each([
   }
 });
 
-it.each(sizes)("nothing covers the first shape at %d x %d, and the hint is there", async (width, height) => {
-  await user.page.setViewportSize({ width, height });
+it.each(sizes)(
+  "nothing covers the first shape at %d x %d, in one picture or two, and the hint is there",
+  async (width, height) => {
+    await user.page.setViewportSize({ width, height });
+    const found: Record<string, string[]> = {};
+    for (const shape of ["bar", "creature", "sheet"]) {
+      await user.ask("app.view.set({ isSplit: false, isPanelOpen: false, tool: 'move' })");
+      await user.ask(`app.startOver("${shape}", "coarse")`);
+      await user.until(`!document.querySelector(".hint").hidden`);
+      for (const isSplit of shape === "creature" ? [false, true] : [false]) {
+        await user.ask(`app.view.set({ isSplit: ${isSplit} })`);
+        await user.until("window.__lpdeform.app.panes.every(({ stage }) => stage.surface)");
+        await drawn(user);
+        const all = await user.page.evaluate(covering);
+        if (all.length > 0) found[`${shape}, ${isSplit ? "two pictures" : "one"}`] = all;
+      }
+    }
+    expect(found).toEqual({});
+  },
+);
+
+/** What of this part of the page cannot be scrolled into sight and pressed there, by name. */
+function outOfReach(part: string): string[] {
+  return [...document.querySelector(part)!.querySelectorAll<HTMLElement>("button, select, input")].flatMap((control) => {
+    const pressed = control.closest<HTMLElement>("label") ?? control;
+    if (!pressed.checkVisibility()) return [];
+    pressed.scrollIntoView({ block: "center", inline: "center" });
+    const { left, right, top, bottom } = pressed.getBoundingClientRect();
+    const found = [left + 2, (left + right) / 2, right - 2].map((x) => document.elementFromPoint(x, (top + bottom) / 2));
+    return found.every((element) => pressed.contains(element)) ? [] : [control.ariaLabel ?? control.textContent];
+  });
+}
+
+const tools = ["move", "brush", "lasso", "box", "paint"];
+
+it.each(sizes)("every option of every tool, the menu and the panel are reached at %d x %d", async (width, height) => {
+  const one = isLittle(width, height) ? touching : user;
+  await one.page.setViewportSize({ width, height });
+  for (const tool of tools) {
+    await one.ask(`app.view.set({ isSplit: false, isPanelOpen: false, tool: "${tool}" })`);
+    await drawn(one);
+    expect(await one.page.evaluate(outOfReach, ".options")).toEqual([]);
+  }
+  await one.page.getByRole("button", { name: "Save" }).click();
+  expect(await one.page.evaluate(outOfReach, ".menu")).toEqual([]);
+  await one.page.keyboard.press("Escape");
+  await one.ask("app.view.set({ isPanelOpen: true })");
+  await one.page.evaluate("document.querySelectorAll('.panel details').forEach((one) => (one.open = true))");
+  expect(await one.page.evaluate(outOfReach, ".panel")).toEqual([]);
+});
+
+it.each(little)("the picture has more than half of a telephone of %d x %d, with the options open", async (width, height) => {
+  for (const one of [user, touching]) {
+    await one.page.setViewportSize({ width, height });
+    for (const tool of tools) {
+      await one.ask(`app.view.set({ isSplit: false, isPanelOpen: false, tool: "${tool}" })`);
+      await drawn(one);
+      const box = (await one.page.locator("canvas.stage").first().boundingBox())!;
+      expect((box.width * box.height) / (width * height)).toBeGreaterThan(0.5);
+    }
+  }
+});
+
+const cases = [...sizes.map((size) => [...size, "a mouse"] as const), ...little.map((size) => [...size, "fingers"] as const)];
+
+it.each(cases)("nothing covers anything at %d x %d under %s", async (width, height, pointer) => {
+  const one = pointer === "fingers" ? touching : user;
+  await one.page.setViewportSize({ width, height });
+  await one.ask(`app.change({ ...window.__lpdeform.document(), secondP: 3 })`);
   const found: Record<string, string[]> = {};
-  for (const shape of ["bar", "creature", "sheet"]) {
-    await user.ask(`app.startOver("${shape}", "coarse")`);
-    await user.ask("app.view.set({ isSplit: false, isPanelOpen: false, tool: 'move' })");
-    await user.until(`!document.querySelector(".hint").hidden`);
-    await user.page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
-    await user.ask("app.fit()");
-    await user.page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
-    const all = await user.page.evaluate(covering);
-    if (all.length > 0) found[shape] = all;
+  for (const state of pointer === "fingers" ? states.filter(({ tool }) => tool === "paint") : states) {
+    await one.ask(`app.view.set(${JSON.stringify(state)})`);
+    await drawn(one);
+    const all = await one.page.evaluate(faults, [parts, isLittle(width, height) ? beside : []]);
+    if (all.length > 0) found[JSON.stringify(state)] = all;
+  }
+  const before = await one.ask("app.facts.now.status");
+  for (const isPanelOpen of [false, true]) {
+    await one.ask(`app.view.set({ isSplit: false, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
+    await one.page.evaluate(
+      ([messages]) => (window as any).__lpdeform.app.facts.set({ ...(messages as object), restoredFrom: Date.now() }),
+      [messages],
+    );
+    await one.page.locator(".banner").waitFor();
+    await drawn(one);
+    const all = await one.page.evaluate(faults, [parts, []]);
+    if (all.length > 0) found[`all messages, panel ${isPanelOpen ? "open" : "closed"}`] = all;
+    await one.page.evaluate(
+      ([nothing, status]) =>
+        (window as any).__lpdeform.app.facts.set({
+          ...(nothing as object),
+          notice: undefined,
+          restoredFrom: undefined,
+          status,
+        }),
+      [nothingSaid, before],
+    );
   }
   expect(found).toEqual({});
 });
 
-it.each(sizes)("nothing covers anything at %d x %d", async (width, height) => {
+it.each([
+  [390, 844],
+  [768, 1024],
+  [844, 390],
+])("two pictures are called as they stand at %d x %d, with the panel and without", async (width, height) => {
   await user.page.setViewportSize({ width, height });
-  await user.ask(`app.change({ ...window.__lpdeform.document(), secondP: 3 })`);
-  const found: Record<string, string[]> = {};
-  for (const state of states) {
-    await user.ask(`app.view.set(${JSON.stringify(state)})`);
-    await user.page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
-    const all = await user.page.evaluate(faults, [parts, isLittle(width, height) ? beside : []]);
-    if (all.length > 0) found[JSON.stringify(state)] = all;
+  for (const isPanelOpen of [true, false, true]) {
+    await user.ask(`app.view.set({ isSplit: true, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
+    await drawn(user);
+    const [first, second] = await Promise.all([0, 1].map((k) => user.page.locator(".pane").nth(k).boundingBox()));
+    const wanted = first!.y === second!.y ? ["left", "right"] : ["upper", "lower"];
+    expect(await user.page.locator(".p-name small").allTextContents()).toEqual(wanted);
   }
-  expect(found).toEqual({});
 });

@@ -187,3 +187,16 @@ it("a mesh without seams has no switch", async () => {
   await user.settled();
   expect(await weldSwitch().isHidden()).toBe(true);
 });
+
+it("a mesh that would come apart, because its seams are not quite closed, says so, and can be welded", async () => {
+  const positions = tube.positions.slice();
+  for (let row = 0; row <= rows; ++row) positions[3 * (row * (columns + 1) + columns)]! += 1e-3;
+  await user.openFiles({ name: "ajar.off", content: writeOff({ ...tube, positions }) });
+  await notice(`Where ${2 * (rows + 1)} vertices of its borders lie near others it comes apart, unless “Weld within”`);
+  await user.until("window.__lpdeform.app.facts.now.report");
+  await user.page.locator("details.warned .seams.torn", { hasText: "it comes apart." }).waitFor();
+  await user.page.getByLabel("How far apart welded vertices may be").selectOption("0.001");
+  await user.until("window.__lpdeform.app.facts.now.seamVertices > 0 && window.__lpdeform.app.facts.now.looseVertices === 0");
+  await user.until("window.__lpdeform.app.facts.now.report");
+  expect(await user.page.locator("details.warned").count()).toBe(0);
+});

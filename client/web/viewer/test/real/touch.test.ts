@@ -103,6 +103,21 @@ it("upright, the sliders of p stay in reach beside the open panel, for one pictu
   await user.settled();
 });
 
+it("fingers are told to tap, and not to click", async () => {
+  const { page } = user;
+  await page.getByRole("button", { name: "Side panel" }).tap();
+  const count = await user.ask<number>("document().handles.length");
+  for (let k = 0; k < count; ++k) await page.locator(".handles button:last-child").first().tap();
+  expect(await page.locator(".handles").textContent()).toBe("None yet: tap the surface.");
+  await page.getByRole("button", { name: "Side panel" }).tap();
+  expect(await page.locator(".hint").textContent()).toBe("Tap the surface to place a first handle");
+  await user.page.getByRole("button", { name: "Save" }).tap();
+  await user.page.getByRole("menuitem", { name: "Handles as JSON" }).tap();
+  await page.locator(".notice.bad", { hasText: "tap the surface to place one" }).waitFor();
+  for (let k = 0; k < count; ++k) await page.getByRole("button", { name: "Undo" }).tap();
+  expect(await user.ask<number>("document().handles.length")).toBe(count);
+});
+
 it("everything that fingers press is large enough for them", async () => {
   await user.page.getByRole("button", { name: "Side panel" }).tap();
   const small = await user.page.evaluate(() =>

@@ -115,6 +115,23 @@ export class User {
     await mouse.up();
   }
 
+  /** Lets go of these files over the page, as a file manager does. */
+  async drop(...files: string[]): Promise<void> {
+    const devtools = await this.page.context().newCDPSession(this.page);
+    const invitation = this.page.getByText("Drop a mesh, a project or a handle file");
+    for (const type of ["dragEnter", "dragOver", "drop"] as const) {
+      await devtools.send("Input.dispatchDragEvent", {
+        type,
+        x: 500,
+        y: 400,
+        data: { items: [], files, dragOperationsMask: 1 },
+      });
+      if (type === "dragOver") await invitation.waitFor();
+    }
+    await devtools.detach();
+    await invitation.waitFor({ state: "hidden" });
+  }
+
   async openFiles(...files: { name: string; content: string | Buffer }[]): Promise<void> {
     const chooser = this.page.waitForEvent("filechooser");
     await this.page.getByRole("button", { name: "Open" }).click();

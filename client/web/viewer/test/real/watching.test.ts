@@ -53,7 +53,7 @@ it("a link shows others the shape as it is and as it changes, and they change no
   await user.settled();
   expect((await user.positions())[3 * vertex!]!).toBeCloseTo(x - 2.5, 3);
   for (const watcher of watchers) {
-    expect(await watcher.page.locator(".tools, .dock, .hint:visible").count()).toBe(0);
+    expect(await watcher.page.locator(".rail, .options, .dock, .hint:visible").count()).toBe(0);
     expect(await watcher.page.locator(".legend").isVisible()).toBe(true);
   }
   await one.page.locator(".readout").waitFor({ state: "attached" });

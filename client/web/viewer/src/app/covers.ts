@@ -1,0 +1,26 @@
+import type { Box } from "../model/free_room.js";
+
+const controls = ".rail, .options, .legend, .dock, .split ~ .dock > *";
+/** Where small.css puts the controls beside the pictures. */
+const littleRoom = matchMedia("(max-width: 720px), (min-aspect-ratio: 1/1) and (max-height: 560px)");
+const margin = 8;
+
+/** What the page's controls cover of a picture, in pixels from its corner. */
+export function coversOf(picture: HTMLElement): Box[] {
+  const { left, top, right, bottom, width } = picture.getBoundingClientRect();
+  // The connection, and the hint where it is over the picture, also before there is one.
+  const messages = littleRoom.matches ? 48 : width > 620 ? 98 : 110;
+  const boxes = [...document.querySelectorAll(controls)].map((control) => control.getBoundingClientRect());
+  return [
+    { left: 0, top: 0, right: right - left, bottom: messages },
+    { left: 0, top: bottom - top - margin, right: right - left, bottom: bottom - top },
+    ...boxes
+      .filter((box) => box.width > 0 && box.left < right && box.right > left && box.top < bottom && box.bottom > top)
+      .map((box) => ({
+        left: box.left - left - margin,
+        top: box.top - top - margin,
+        right: box.right - left + margin,
+        bottom: box.bottom - top + margin,
+      })),
+  ];
+}
