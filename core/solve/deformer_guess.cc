@@ -11,7 +11,7 @@ constexpr double kFarthestGuess = 2;  // the guess continues the last move by le
 constexpr double kSameWay = 0.5;      // two moves count as one drag above this squared cosine between them
 // In such a drag, the squared ratio of the surface's largest move to the handles' largest move is below this.
 constexpr double kSteady = 9;
-constexpr int kMostAlone = 4;  // see moves_alone
+constexpr double kMostAbove = 2;  // see is_good
 
 }  // namespace
 
@@ -61,12 +61,12 @@ std::optional<Points> Deformer::Impl::led_guess() {
   return u;
 }
 
-/// Whether a led guess is at least as good as the other one, by E^(1/2) : at a large p its kinks would decide, which the first
-/// iterations take away.
-bool Deformer::Impl::is_as_good(const Points& led, const Points& other) {
+/// Whether a led guess is not much worse than the other one: at p = 2 its E^(1/2) is at most kMostAbove times as high. It may be higher,
+/// because it has kinks that the first iterations take away. At a large p a few kinks would decide.
+bool Deformer::Impl::is_good(const Points& led, const Points& other) {
   const LpNorm even(Material::uniform(2), shape->vertex_count(), unit(), 1);
-  const double sum = objective.evaluate(other, even);
-  return objective.evaluate(led, even) <= sum;
+  const double most = kMostAbove * kMostAbove * objective.evaluate(other, even);
+  return objective.evaluate(led, even) <= most;
 }
 
 /// Lets the coarse level, where there is one, follow to `guess`, so that it can lead from the next move on.
@@ -96,9 +96,7 @@ Points Deformer::Impl::current_guess() {
     lead = Lead::kNone;  // the fine level goes on alone
     return x;
   }
-  const bool is_alone = std::exchange(moves_alone, std::max(0, moves_alone - 1)) > 0;
-  if (is_alone) lead = Lead::kNone;
-  const bool can_lead = !is_alone && warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, bending);
+  const bool can_lead = warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, bending);
   std::optional<Points> led = can_lead ? led_guess() : std::nullopt;
   const double share = size > 0 ? along / size : 0;
   const bool goes_on = share > 0 && share < kFarthestGuess && along * along > kSameWay * size * left &&
@@ -113,20 +111,13 @@ Points Deformer::Impl::current_guess() {
   if (goes_on) u += share * last;
   Points guess = x + u;
   if (!can_lead || !guess.allFinite()) return guess;
-  if (!led) {
-    follow(guess);
-    return guess;
+  if (led && is_good(*led, guess)) {
+    // If some p_i > 2, the weights of the move before differ so much that a step in their metric is cut short.
+    if (material.p.maxCoeff() > 2) warmth = Warmth::kWarm;
+    return *std::move(led);
   }
-  if (!is_as_good(*led, guess)) {  // the surface keeps up by itself
-    lead = Lead::kNone;
-    moves_alone = next_alone;
-    next_alone = std::min(2 * next_alone, kMostAlone);
-    return guess;
-  }
-  next_alone = 1;
-  // If some p_i > 2, the weights of the move before differ so much that a step in their metric is cut short.
-  if (material.p.maxCoeff() > 2) warmth = Warmth::kWarm;
-  return *std::move(led);
+  follow(guess);
+  return guess;
 }
 
 Points Deformer::Impl::initial_guess(InitialGuess guess) {

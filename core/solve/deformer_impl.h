@@ -39,7 +39,7 @@ struct Deformer::Impl {
   Points current_guess();
   std::optional<Points> led_guess();
   void follow(const Points& guess);
-  bool is_as_good(const Points& led, const Points& other);
+  bool is_good(const Points& led, const Points& other);
   FineInputs coarse_inputs(const Material& effective) const;
   SoftTerms guess_springs() const;
   Points initial_guess(InitialGuess guess);
@@ -152,8 +152,6 @@ struct Deformer::Impl {
     kTogether,  // it is for the same inputs, and has come as far as x
   };
   Lead lead = Lead::kNone;
-  int moves_alone = 0;      // the next moves that do without the coarse level
-  int next_alone = 1;       // moves_alone after the next move that the coarse level has not guided better
   int fine_iterations = 0;  // of the running solve
   std::unique_ptr<Minimiser> minimiser;
   std::unique_ptr<MinimaSearch> search;      // runs after the minimiser has ended
