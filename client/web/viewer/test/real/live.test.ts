@@ -55,12 +55,16 @@ it("holds nothing of second pictures that were closed", async () => {
   const devtools = await user.page.context().newCDPSession(user.page);
   const expression = "Object.getPrototypeOf(window.__lpdeform.app.panes[0].stage)";
   const { result } = await devtools.send("Runtime.evaluate", { expression });
-  const { objects } = await devtools.send("Runtime.queryObjects", { prototypeObjectId: result.objectId! });
-  const count = await devtools.send("Runtime.callFunctionOn", {
-    functionDeclaration: "function () { return this.length; }",
-    objectId: objects.objectId!,
-  });
-  expect(count.result.value).toBe(1);
+  const stages = async () => {
+    const { objects } = await devtools.send("Runtime.queryObjects", { prototypeObjectId: result.objectId! });
+    const count = await devtools.send("Runtime.callFunctionOn", {
+      functionDeclaration: "function () { return this.length; }",
+      objectId: objects.objectId!,
+    });
+    return count.result.value as number;
+  };
+  // A session that is still being closed holds its picture.
+  await expect.poll(stages, { timeout: 10_000 }).toBe(1);
   await devtools.detach();
 });
 
