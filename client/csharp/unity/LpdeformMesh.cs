@@ -77,7 +77,14 @@ public sealed class LpdeformMesh : MonoBehaviour
             return;
         }
         session.Noticed += notice => { if (notice.Reason != NoticeReason.None) Debug.Log("lpdeform: " + notice.Text, this); };
-        foreach (var handle in handles) Hold(handle);
+        try
+        {
+            foreach (var handle in handles) Hold(handle);
+        }
+        catch (LpdeformException error)
+        {
+            Warn(error);
+        }
     }
 
     void Remember(UnityEngine.Mesh present)
@@ -134,7 +141,7 @@ public sealed class LpdeformMesh : MonoBehaviour
         }
         catch (LpdeformException error)
         {
-            Debug.LogWarning("lpdeform: " + error.Message + " (" + error.Reason + ")", this);  // about a change; each error comes once
+            Warn(error);
         }
     }
 
@@ -149,8 +156,15 @@ public sealed class LpdeformMesh : MonoBehaviour
         }
         catch (LpdeformException error)
         {
-            Debug.LogWarning("lpdeform: " + error.Message + " (" + error.Reason + ")", this);
+            Warn(error);
         }
+    }
+
+    /// Says what was wrong with a change; each error comes once. If the session was refused meanwhile, the error is the refusal.
+    void Warn(LpdeformException error)
+    {
+        if (session.State == SessionState.Refused) Tell();
+        else Debug.LogWarning("lpdeform: " + error.Message + " (" + error.Reason + ")", this);
     }
 
     /// Shows the session's state if it has changed, and releases a session that has ended, because it would throw at every call.

@@ -190,8 +190,8 @@ def test_an_exception_on_the_thread_that_sends_ends_the_session_with_its_text(
 
     session.settle(PATIENCE)
     monkeypatch.setattr(where, fails)
-    session.drag("right", translation=[0, 0, 1])
     with pytest.raises(lpdeform.LpdeformError, match=str(raised)) as caught:
+        session.drag("right", translation=[0, 0, 1])  # raises too if the thread has looked by itself meanwhile
         session.settle(PATIENCE)
     assert (caught.value.code, caught.value.reason) == (lpdeform.Code.INTERNAL, "EXCEPTION")
     assert session.connection == "closed"
