@@ -47,6 +47,14 @@ export interface LaneSink {
 export type WireFrameOptions = MessageInitShape<typeof FrameOptionsSchema>;
 
 const mostLanes = 16;
+
+/** Bytes of positions in a part of a frame, from which on decoding several parts would keep a page busy. */
+const largePart = 1 << 16;
+
+function isLarge(event: StreamEvent | undefined): boolean {
+  return event?.event.case === "frame" && event.event.value.positions.length > largePart;
+}
+
 /** How often a hidden page checks whether its stream may pause. */
 const restIntervalMs = 10_000;
 
@@ -245,6 +253,7 @@ class SharedStream {
         const lane = lanes[stream];
         if (lane && event && this.lanes.has(lane)) this.#take(lane, event);
         if (this.#call === call) this.#heard(call);
+        if (isLarge(event)) await new Promise<void>(inTaskOfItsOwn); // messages that have come together would be one task
       }
     } catch (thrown) {
       error = call.signal.reason instanceof LpdeformError ? call.signal.reason : fromCall(thrown);

@@ -6,10 +6,13 @@ import { inTaskOfItsOwn } from "./task.js";
 import { updateToWire } from "./towire.js";
 import { Uploads } from "./upload.js";
 
+/** From this number of vertices on, the task that changes a handle often draws for some milliseconds as well. */
+const largeVertices = 20_000;
+
 /** Sends an update, after uploading its large arrays. Resolves with whether it survives a restart of the server. */
 export async function sendUpdate(
   rpc: Rpc,
-  { session, writerToken }: Lease,
+  { session, writerToken, report }: Lease,
   update: NumberedUpdate,
   signal: AbortSignal,
 ): Promise<boolean> {
@@ -17,7 +20,7 @@ export async function sendUpdate(
   const uploads = new Uploads(rpc, signal);
   const message = updateToWire(update.update, update.seq, packer);
   try {
-    if (packer.isLarge) await new Promise<void>(inTaskOfItsOwn); // the caller's task ends first
+    if (packer.isLarge || report.vertices >= largeVertices) await new Promise<void>(inTaskOfItsOwn); // the caller's task ends first
     await packer.flush((bytes) => uploads.add(bytes));
     const { result } = await rpc.call("updateHandles", { session, writerToken, update: message }, signal);
     return result?.kept ?? false;

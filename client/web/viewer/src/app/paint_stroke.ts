@@ -4,12 +4,18 @@ import type { PointerAt, Stroke } from "../stage/pointing.js";
 import type { Pane } from "./pane.js";
 import type { Workbench } from "./workbench.js";
 
+/** From this number of vertices on, a step of the brush and the picture that the pointer's task draws would take too long together. */
+const largeVertices = 20_000;
+
 /** A stroke of the brush that paints p or stiffness. It is seen while it goes on, and is one step when it ends. */
 export class PaintStroke implements Stroke {
   /** For each vertex the most that any place of the stroke has worked on it. */
   readonly #strengths = new Map<number, number>();
   readonly #before;
   readonly #brush: Brush;
+  /** Places that are painted in a task of their own. */
+  #ahead: PointerAt[] = [];
+  #task: ReturnType<typeof setTimeout> | undefined;
 
   /** `dabAt`: the vertices under the brush. */
   constructor(
@@ -27,21 +33,41 @@ export class PaintStroke implements Stroke {
 
   move(at: PointerAt): void {
     if (!at.hit) return;
+    this.#ahead.push(at);
+    if (this.work.mesh.positions.length < 3 * largeVertices) this.#paint();
+    else this.#task ??= setTimeout(() => this.#paint());
+  }
+
+  #paint(): void {
+    clearTimeout(this.#task);
+    this.#task = undefined;
+    const places = this.#ahead;
+    if (places.length === 0) return;
+    this.#ahead = [];
     const { work } = this;
+    const { adjacency, seams } = work;
+    const pointedOut = new Set<number>();
+    for (const at of places) {
+      for (const [vertex, strength] of this.#strengthsAt(at)) {
+        pointedOut.add(vertex);
+        if (strength > (this.#strengths.get(vertex) ?? 0)) this.#strengths.set(vertex, strength);
+      }
+    }
+    work.facts.set({ pointedOut: ofVertices([...pointedOut]) });
+    const count = work.mesh.positions.length / 3;
+    work.during(paintSoftly(this.#before, this.#strengths, this.#brush, count, adjacency, seams?.groups), places.at(-1)!.time);
+  }
+
+  #strengthsAt(at: PointerAt): Map<number, number> {
+    const { mirror, seams } = this.work;
     const dab = this.dabAt(at);
-    const { adjacency, seams, mirror } = work;
     const strengths = new Map(dab.map((vertex) => [vertex, this.#strengthOf(vertex, at.hit!.point)]));
     for (const [image, vertex] of mirror?.imagesOf(dab) ?? []) {
       for (const copy of seams?.withCopies([image]) ?? [image]) {
         strengths.set(copy, Math.max(strengths.get(vertex)!, strengths.get(copy) ?? 0));
       }
     }
-    for (const [vertex, strength] of strengths) {
-      if (strength > (this.#strengths.get(vertex) ?? 0)) this.#strengths.set(vertex, strength);
-    }
-    work.facts.set({ pointedOut: ofVertices([...strengths.keys()]) });
-    const count = work.mesh.positions.length / 3;
-    work.during(paintSoftly(this.#before, this.#strengths, this.#brush, count, adjacency, seams?.groups), at.time);
+    return strengths;
   }
 
   #strengthOf(vertex: number, point: readonly number[]): number {
@@ -52,11 +78,13 @@ export class PaintStroke implements Stroke {
   }
 
   end(): void {
+    this.#paint();
     this.work.facts.set({ pointedOut: nothing });
     this.work.endGesture();
   }
 
   cancel(): void {
+    clearTimeout(this.#task);
     this.work.facts.set({ pointedOut: nothing });
     this.work.cancelGesture();
   }
