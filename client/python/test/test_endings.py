@@ -224,6 +224,7 @@ def test_a_stream_of_another_mesh_ends_the_session(remote_session: lpdeform.Sess
     report = dataclasses.replace(link.lease.report, vertices=len(shape.vertices) - 1)
     link.lease = dataclasses.replace(link.lease, report=report)
     with pytest.raises(lpdeform.LpdeformError, match=f"{len(shape.vertices)} vertices") as caught:
+        session.drag("right", translation=[0, 0, 1])  # there will be another frame
         session.settle(PATIENCE)
     assert (caught.value.code, caught.value.reason) == (lpdeform.Code.DATA_LOSS, "FRAME_VERTICES")
     assert session.connection == "closed"

@@ -159,7 +159,10 @@ export class Stage {
     const distanceIn = (part: Box) => this.#distanceFor(min, max, center, part);
     const [right, bottom] = this.#size as [number, number];
     const whole = { left: 0, top: 0, right, bottom };
-    const free = freeRoom(whole, covers, (part) => -distanceIn(part));
+    // A part in the middle is better than one aside where the surface would be a little larger.
+    const aside = ({ left, top, right: end, bottom: below }: Box) =>
+      Math.hypot((left + end) / right - 1, (top + below) / bottom - 1) / 2;
+    const free = freeRoom(whole, covers, (part) => -distanceIn(part) * (1 + aside(part)));
     this.#covered = { left: free.left, top: free.top, right: right - free.right, bottom: bottom - free.bottom };
     this.#center();
     camera.position.copy(this.target).addScaledVector(away, Math.min(distanceIn(free), mostFar * distanceIn(whole)));

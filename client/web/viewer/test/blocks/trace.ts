@@ -75,7 +75,15 @@ export class Trace {
       .filter(({ name, pid, tid, dur }) => name === "RunTask" && pid === first.pid && tid === first.tid && dur !== undefined)
       .map(({ ts, dur = 0, tdur = 0 }) => ({ begin: ts / 1000, end: (ts + dur) / 1000, wall: dur / 1000, cpu: tdur / 1000 }))
       .sort((a, b) => a.begin - b.begin);
-    return { tasks, marks: marked.map(({ ts }) => ts / 1000).sort((a, b) => a - b) };
+    return { tasks, marks: this.marks(mark) };
+  }
+
+  /** When the page made marks of this name. Only after stop(). */
+  marks(name: string): number[] {
+    return this.#events
+      .filter((one) => one.name === name)
+      .map(({ ts }) => ts / 1000)
+      .sort((a, b) => a - b);
   }
 
   /** What the thread did in the task, the longest first: events by what they computed, and functions by the clock, in milliseconds. */

@@ -4,6 +4,7 @@ import { join } from "node:path";
 import { afterAll, beforeAll, it } from "vitest";
 import { openSession } from "../../../client/src/index.js";
 import { Service } from "../../../client/test/support/service.js";
+import { sizes } from "../support/sizes.js";
 import { User } from "../real/user.js";
 
 const out = join(import.meta.dirname, "../../../../../build/viewer-pictures");
@@ -218,6 +219,70 @@ const states: readonly State[] = [
   },
 ];
 
+const openSection = (user: User, name: string) => user.page.locator("summary", { hasText: name }).click();
+
+/** What an artist has at hand. */
+const tools: readonly State[] = [
+  {
+    name: "poses",
+    act: async (user) => {
+      await openSection(user, "Poses");
+      await user.page.getByRole("button", { name: "Keep this pose", exact: true }).click();
+      await raiseHead(user);
+      await user.page.getByRole("button", { name: "Keep this pose", exact: true }).click();
+      await user.page.getByRole("button", { name: "Pose 2", exact: true }).waitFor();
+    },
+  },
+  {
+    name: "blend",
+    query: "?shape=bar",
+    act: async (user) => {
+      await pull(user, "Top", 150, 130);
+      await user.page.getByText("Blend through p").click();
+      await user.page.getByRole("checkbox", { name: "Prepare blending" }).setChecked(true, { force: true });
+      await user.page.getByRole("slider", { name: "Blend p" }).and(user.page.locator(":enabled")).waitFor({ timeout: 60_000 });
+    },
+  },
+  {
+    name: "symmetric-p-brush",
+    isLight: true,
+    act: async (user) => {
+      await keys(user, "5");
+      await user.page.getByLabel("Symmetry").selectOption("x");
+      const { x, y } = await place(user, 0.3, -0.1, 0.6);
+      await stroke(
+        user,
+        Array.from({ length: 14 }, (_, k) => [x - 30 + 5 * k, y + 40 - 10 * k] as const),
+      );
+    },
+  },
+  {
+    name: "viridis",
+    act: async (user) => (await raiseHead(user), await user.page.getByLabel("Palette").selectOption("viridis")),
+  },
+  {
+    name: "from-the-left",
+    isLight: true,
+    act: async (user) => (await raiseHead(user), await user.page.getByRole("button", { name: "Left", exact: true }).click()),
+  },
+  {
+    name: "link-to-watch",
+    act: async (user) => {
+      await raiseHead(user);
+      await user.page.getByRole("button", { name: "Save" }).click();
+      await user.page.getByRole("menuitem", { name: "Link to watch live" }).click();
+    },
+  },
+];
+
+/** Every size of the test of the layout. */
+const bySize: readonly State[] = sizes.map(([width, height]) => ({
+  name: `size-${width}x${height}`,
+  query: "?shape=bar",
+  size: { width, height, hasTouch: Math.min(width, height) < 700 },
+  act: (user) => pull(user, "Top", 0.1 * width, 0.05 * height),
+}));
+
 /** What stands between somebody and their work. */
 const troubles: readonly State[] = [
   {
@@ -304,7 +369,7 @@ const inLittleRoom = troubles
   .filter(({ name }) => ["away", "made-room", "help"].includes(name))
   .map((state) => ({ ...state, name: `narrow-${state.name}`, size: narrow }));
 
-it.each([...states, ...atBothSizes, ...inLittleRoom].filter(({ name }) => only.test(name)))(
+it.each([...states, ...tools, ...bySize, ...atBothSizes, ...inLittleRoom].filter(({ name }) => only.test(name)))(
   "$name",
   async ({ name, query = "", size = desktop, isLight = false, serverFlags, prepare, shows, act }: State) => {
     const served = serverFlags ? await Service.start({ files, serverFlags }) : service;
@@ -316,7 +381,7 @@ it.each([...states, ...atBothSizes, ...inLittleRoom].filter(({ name }) => only.t
       await act?.(user, served);
       // The picture at rest, and plots; there is none before there is a surface.
       await user.until(
-        `window.__lpdeform.app.panes.every(({ stage }) => !stage.surface || stage.canvas.width >= 2 * stage.canvas.clientWidth)`,
+        `window.__lpdeform.app.panes.every(({ stage }) => !stage.surface || stage.canvas.width >= Math.min(2 * stage.canvas.clientWidth, 3840))`,
       );
       await user.page.waitForTimeout(1200);
       await user.page.screenshot({ path: join(out, `${name}.png`) });

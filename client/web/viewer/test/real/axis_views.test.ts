@@ -80,8 +80,15 @@ it("Q draws without perspective: what is pressed, drawn and dragged is where it 
   await user.page.keyboard.press("Control+z");
 });
 
-it("a mesh whose y is up is looked at from its own top", async () => {
-  await user.ask("app.view.set({ isYUp: true, isSplit: false })");
-  await user.page.getByRole("button", { name: "Top", exact: true }).click();
-  expect(await direction()).toEqual([0, 1, 0]);
+it("one click says that y is up, and the mesh is looked at from that top; another takes it back", async () => {
+  await user.ask("app.view.set({ isSplit: false })");
+  const up = user.page.locator(".panel label", { hasText: "Y is up" });
+  for (const top of [
+    [0, 1, 0],
+    [0, 0, 1],
+  ]) {
+    await up.click();
+    await user.page.getByRole("button", { name: "Top", exact: true }).click();
+    expect(await direction()).toEqual(top);
+  }
 });

@@ -1,6 +1,7 @@
 import { join } from "node:path";
 import { afterAll, beforeAll, expect, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
+import { sizes } from "../support/sizes.js";
 import { User } from "./user.js";
 
 // At every size, nothing that is pressed or read covers anything else.
@@ -25,26 +26,6 @@ afterAll(async () => {
   await service.stop();
 });
 
-const sizes: (readonly [number, number])[] = [
-  [360, 640],
-  [390, 844],
-  [414, 896],
-  [600, 960],
-  [640, 360],
-  [667, 375],
-  [740, 360],
-  [768, 1024],
-  [844, 390],
-  [932, 430],
-  [1024, 600],
-  [1024, 768],
-  [1280, 720],
-  [1280, 800],
-  [1440, 900],
-  [1920, 1080],
-  [2560, 1440],
-  [3840, 2160],
-];
 const states = [false, true].flatMap((isSplit) =>
   [false, true].flatMap((isPanelOpen) => (["move", "paint", "lasso"] as const).map((tool) => ({ isSplit, isPanelOpen, tool }))),
 );
