@@ -96,6 +96,7 @@ it.each<[Content, string]>([
   [but(dae, /<vertices.*<\/vertices>/, ""), ", line 11: the geometry “tube” has no <vertices> with a POSITION."],
   [but(dae, ' stride="3"', ""), ", line 13: the places “places” have the stride 1 and the offset 0; this page reads 3 and 0."],
   [but(dae, "<p>", '<input semantic="NORMAL" source="#n" offset="0"/><p>'), ", line 18: the input NORMAL names “#n”, which"],
+  [but(dae, 'offset="0"', ""), ", line 17: <triangles> of the geometry “tube” has an input VERTEX with the offset “”."],
   [but(dae, "#tube", "#tubes"), ", line 22: <instance_geometry> names “#tubes”, which is no <geometry> of the file."],
   [but(dae, "#scene", "#node"), ", line 26: <instance_visual_scene> names “#node”, which is no <visual_scene> of the file."],
   [but(dae, "#red-fx", "other.dae#fx"), ", line 10: <instance_effect> names “other.dae#fx”, which is no <effect>"],

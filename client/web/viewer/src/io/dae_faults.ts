@@ -80,17 +80,19 @@ interface Source {
   count: number;
 }
 
+type Sources = ReadonlyMap<string | undefined, Source>;
+
 function checkGeometry(xml: XmlText, geometry: Element): void {
   const mesh = child(geometry, "mesh");
   if (!mesh) return;
   const of = `the geometry “${idOf(geometry)}”`;
-  const sources = new Map(childrenOf(mesh, "source").map((source) => [idOf(source), sourceOf(xml, source)]));
+  const sources = new Map(childrenOf(mesh, "source").map((source) => [source.attributes["id"], sourceOf(xml, source)]));
   const vertices = child(mesh, "vertices");
   const position = vertices && childrenOf(vertices, "input").find(({ attributes }) => attributes["semantic"] === "POSITION");
   if (!vertices || !position) throw xml.fault(mesh.at, `${of} has no <vertices> with a POSITION`);
   checkPlaces(
     xml,
-    childrenOf(mesh, "source").find((source) => `#${idOf(source)}` === position.attributes["source"]),
+    childrenOf(mesh, "source").find((source) => `#${source.attributes["id"]}` === position.attributes["source"]),
   );
   for (const input of childrenOf(vertices, "input")) known(xml, input, sources);
   for (const primitive of mesh.children) {
@@ -110,7 +112,7 @@ function checkGeometry(xml: XmlText, geometry: Element): void {
 
 const isVertex = ({ attributes }: Element) => attributes["semantic"] === "VERTEX";
 
-function known(xml: XmlText, input: Element, sources: ReadonlyMap<string, Source>): Source {
+function known(xml: XmlText, input: Element, sources: Sources): Source {
   const { semantic, source = "" } = input.attributes;
   const found = sources.get(source.slice(1));
   if (!found) throw xml.fault(input.at, `the input ${semantic} names “${source}”, which is no <source> of its <mesh>`);
@@ -155,53 +157,60 @@ function checkPlaces(xml: XmlText, source: Element | undefined): void {
   }
 }
 
-function checkFaces(
-  xml: XmlText,
-  faces: Element,
-  of: string,
-  vertices: Element,
-  places: Source,
-  sources: ReadonlyMap<string, Source>,
-): void {
+type Fault = (what: string, at?: number) => FileFault;
+
+function checkFaces(xml: XmlText, faces: Element, of: string, vertices: Element, places: Source, sources: Sources): void {
   const { name } = faces;
-  const fault = (what: string, at = faces.at) => xml.fault(at, `<${name}> of ${of} ${what}`);
-  const inputs = childrenOf(faces, "input");
-  if (!inputs.some(isVertex)) throw fault("has no input VERTEX");
+  const fault: Fault = (what, at = faces.at) => xml.fault(at, `<${name}> of ${of} ${what}`);
   const said = faces.attributes["count"] ?? "";
   if (!/^\d+$/.test(said)) throw fault(`has the count “${said}”`);
   const count = Number(said);
-  const lists = childrenOf(faces, "p");
-  if (child(faces, "ph")) throw fault("has a polygon with holes (<ph>), which this page does not read");
-  if (name === "polygons" && lists.length > 1)
-    throw fault(`has ${lists.length} polygons; this page reads one, or a <polylist>`);
-  if (lists.length !== 1) throw fault(`has ${lists.length} lists <p> in place of 1`);
-  const indices = indicesIn(xml, lists[0]!);
-  const offsets = inputs.map((input) => Number(input.attributes["offset"]));
-  const noOffset = offsets.findIndex((offset) => !(Number.isInteger(offset) && offset >= 0));
-  if (noOffset >= 0)
-    throw fault(`has an input ${inputs[noOffset]!.attributes["semantic"]} without an offset`, inputs[noOffset]!.at);
-  const stride = Math.max(...offsets) + 1;
+  const list = onlyList(faces, fault);
+  const inputs = checkedInputs(faces, vertices, fault);
+  const stride = Math.max(...inputs.map(offsetOf)) + 1;
+  const indices = indicesIn(xml, list);
   const corners = name === "triangles" ? undefined : cornersOf(xml, faces, indices.length / stride, fault);
   const polygonCount = corners?.length ?? count;
   if (polygonCount !== count) throw fault(`says that it has ${count} polygons, and has ${polygonCount}`);
   const wanted = stride * (corners ? corners.reduce((sum, one) => sum + one, 0) : 3 * count);
   if (wanted !== indices.length) {
-    throw fault(`has ${count} polygons, for which <p> needs ${wanted} numbers; it has ${indices.length}`, lists[0]!.at);
+    throw fault(`has ${count} polygons, for which <p> needs ${wanted} numbers; it has ${indices.length}`, list.at);
   }
-  for (const [k, input] of inputs.entries()) {
-    if (isVertex(input) && input.attributes["source"] !== `#${idOf(vertices)}`) {
-      throw fault(`names “${input.attributes["source"]}”, which is no <vertices> of its <mesh>`, input.at);
-    }
+  for (const input of inputs) {
     const limit = isVertex(input) ? places.count : known(xml, input, sources).count;
-    for (let at = offsets[k]!; at < indices.length; at += stride) {
+    for (let at = offsetOf(input); at < indices.length; at += stride) {
       if (indices[at]! < limit) continue;
+      const polygon = polygonOf(corners, Math.floor(at / stride));
       const what = isVertex(input) ? "vertex" : input.attributes["semantic"];
-      throw fault(
-        `has a polygon ${polygonOf(corners, Math.floor(at / stride))} with ${what} ${indices[at]}; there are ${limit}, counted from 0`,
-        lists[0]!.at,
-      );
+      throw fault(`has a polygon ${polygon} with ${what} ${indices[at]}; there are ${limit}, counted from 0`, list.at);
     }
   }
+}
+
+/** The indices of all corners. */
+function onlyList(faces: Element, fault: Fault): Element {
+  const lists = childrenOf(faces, "p");
+  if (child(faces, "ph")) throw fault("has a polygon with holes (<ph>), which this page does not read");
+  if (faces.name === "polygons" && lists.length > 1) {
+    throw fault(`has ${lists.length} polygons; this page reads one, or a <polylist>`);
+  }
+  if (lists.length !== 1) throw fault(`has ${lists.length} lists <p> in place of 1`);
+  return lists[0]!;
+}
+
+const offsetOf = ({ attributes }: Element) => Number(attributes["offset"]);
+
+function checkedInputs(faces: Element, vertices: Element, fault: Fault): Element[] {
+  const inputs = childrenOf(faces, "input");
+  if (!inputs.some(isVertex)) throw fault("has no input VERTEX");
+  for (const { attributes, at } of inputs) {
+    const { semantic, source, offset = "" } = attributes;
+    if (!/^\d+$/.test(offset)) throw fault(`has an input ${semantic} with the offset “${offset}”`, at);
+    if (semantic === "VERTEX" && source !== `#${vertices.attributes["id"]}`) {
+      throw fault(`names “${source}”, which is no <vertices> of its <mesh>`, at);
+    }
+  }
+  return inputs;
 }
 
 function indicesIn(xml: XmlText, list: Element): number[] {
@@ -212,7 +221,7 @@ function indicesIn(xml: XmlText, list: Element): number[] {
 }
 
 /** How many corners each polygon of a <polylist> or <polygons> has. */
-function cornersOf(xml: XmlText, faces: Element, all: number, fault: (what: string, at?: number) => FileFault): number[] {
+function cornersOf(xml: XmlText, faces: Element, all: number, fault: Fault): number[] {
   const list = child(faces, "vcount");
   if (faces.name === "polylist" && !list) throw fault("has no <vcount>");
   const corners = faces.name === "polygons" ? [Math.floor(all)] : indicesIn(xml, list!);
