@@ -169,6 +169,7 @@ it.each<[Content, string]>([
   [but(fbx, "FBXVersion: 7400", "FBXVersion: 6100"), ": FBX version not supported, FileVersion: 6100."],
   ["hello", ": Cannot find the version number for the file given."],
   [makeBinaryTube(6100), ": FBX version not supported, FileVersion: 6100."],
+  [binary.map((byte) => byte || 32), ": byte 20 is 32 in place of 0; the file was changed as if it were text."],
   [binary.subarray(0, 1500), " ends too soon, in or after its node “PolygonVertexIndex” at byte 813: it has 1500"],
   [binary.subarray(0, binary.length - 310), ": the geometry 1001 “tube” belongs to no model: the connections name none."],
 ])("a broken FBX file is refused by its geometry (%#)", async (content, words) => {
@@ -185,6 +186,16 @@ it("a broken FBX file in binary is refused by its geometry and polygon", async (
   const damaged = Uint8Array.from(binary);
   damaged.fill(255, 300, 330);
   await expectRefused("a.fbx", damaged, "a.fbx: the Vertices of the geometry 1001 “tube” at byte");
+});
+
+it("a layer without what it needs is named", async () => {
+  const layer = (name: string, lines: string) => objects(`\t\t${name}: 0 {\n${lines}\t\t}\n`);
+  const indexed = '\t\t\tReferenceInformationType: "IndexToDirect"\n\t\t\tColors: *4 {\n\t\t\t\ta: 1,1,1,1\n\t\t\t}\n';
+  const wrong = "a.fbx, line 22: the geometry 1001 “tube” has a ";
+  await expectRefused("a.fbx", layer("LayerElementColor", indexed), `${wrong}LayerElementColor without ColorIndex.`);
+  await expectRefused("a.fbx", layer("LayerElementNormal", ""), `${wrong}LayerElementNormal without Normals.`);
+  const none = '\t\t\tMappingInformationType: "NoMappingInformation"\n';
+  expect((await converted("a.fbx", layer("LayerElementMaterial", none))).left).toEqual([]);
 });
 
 it("normals that are no numbers are left out, and the page says so", async () => {

@@ -21,7 +21,26 @@ interface Geometry {
   kind: string;
   places?: Numbers;
   corners?: Numbers;
+  layers: Layer[];
 }
+
+/** What vertices and polygons have beside their places, such as LayerElementUV. */
+interface Layer {
+  where: string;
+  name: string;
+  /** Its ways of mapping and of reference. */
+  ways: Set<string>;
+  /** The names of what stands in it. */
+  parts: Set<string>;
+}
+
+/** What the reader needs of each layer, and what else if it is indexed. */
+const layerParts: Readonly<Record<string, readonly [string, string?]>> = {
+  LayerElementNormal: ["Normals"],
+  LayerElementUV: ["UV", "UVIndex"],
+  LayerElementColor: ["Colors", "ColorIndex"],
+  LayerElementMaterial: ["Materials"],
+};
 
 interface Contents {
   geometries: Geometry[];
@@ -33,6 +52,9 @@ interface Contents {
 /** Throws a FileFault. */
 export function checkFbx(name: string, bytes: Uint8Array<ArrayBuffer>): void {
   const isBinary = isBinaryFbx(bytes);
+  if (isBinary && bytes[20] !== 0) {
+    throw new FileFault(`${name}: byte 20 is ${bytes[20]} in place of 0; the file was changed as if it were text.`);
+  }
   const text = isBinary ? "" : new TextDecoder().decode(bytes);
   if (isBinary ? versionOf(bytes) < 6400 : !(Number(/FBXVersion: (\d+)/.exec(text)?.[1]) >= 7000)) return; // the reader says so
   const { geometries, models, connections } = isBinary ? binaryContents(name, bytes) : textContents(name, text);
@@ -44,6 +66,7 @@ export function checkFbx(name: string, bytes: Uint8Array<ArrayBuffer>): void {
     const fault = (where: string, what: string) => new FileFault(`${where}: ${called} ${what}.`);
     checkNumbers(geometry, fault);
     checkPolygons(geometry, fault);
+    checkLayers(geometry, fault);
     if (!owned.has(geometry.id)) throw fault(geometry.where, "belongs to no model: the connections name none");
   }
 }
@@ -91,6 +114,21 @@ function checkPolygons({ where, places, corners }: Geometry, fault: Fault): void
   if (size > 0) throw fault(corners.where, `has a polygon ${polygon} without an end`);
 }
 
+function checkLayers({ layers }: Geometry, fault: Fault): void {
+  for (const { where, name, ways, parts } of layers) {
+    const [array, index] = layerParts[name]!;
+    if (ways.has("NoMappingInformation")) continue;
+    // The reader passes over colours and places in a texture that are not there.
+    const isUnread = !parts.has(array) && index !== undefined;
+    const missing = [array, ways.has("IndexToDirect") ? index : undefined].find(
+      (part) => part !== undefined && !parts.has(part),
+    );
+    if (missing !== undefined && !isUnread) throw fault(where, `has a ${name} without ${missing}`);
+  }
+}
+
+const layerOf = (where: string, name: string): Layer => ({ where, name, ways: new Set(), parts: new Set() });
+
 const plainName = (name: string) => name.split("\0")[0]!.replace(/^\w+::/, "");
 
 function binaryContents(file: string, bytes: Uint8Array<ArrayBuffer>): Contents {
@@ -112,8 +150,12 @@ function binaryContents(file: string, bytes: Uint8Array<ArrayBuffer>): Contents 
       if (name === "Model" && first) contents.models.add(id(first));
       if (name === "C" && first && second && third && text(first) === "OO") contents.connections.push([id(second), id(third)]);
       if (name === "Geometry" && first && second && third) {
-        contents.geometries.push({ where: file, id: id(first), name: plainName(text(second)), kind: text(third) });
+        contents.geometries.push({ where: file, id: id(first), name: plainName(text(second)), kind: text(third), layers: [] });
       }
+      const layer = geometry?.layers.at(-1);
+      if (Object.hasOwn(layerParts, name)) geometry?.layers.push(layerOf(file, name));
+      else layer?.parts.add(name);
+      if (/^(Mapping|Reference)InformationType$/.test(name) && layer && first) layer.ways.add(text(first));
       if (geometry && name === "Vertices") geometry.places = numbersOf(file, bytes, node, geometry);
       if (geometry && name === "PolygonVertexIndex") geometry.corners = numbersOf(file, bytes, node, geometry);
     }
@@ -152,36 +194,59 @@ function numbersOf(file: string, bytes: Uint8Array<ArrayBuffer>, node: FbxNode, 
   return { where: file, count: array.length, values };
 }
 
+/** Lines of an FBX file in text that say something here. */
+const heads = new RegExp(
+  "^[ \\t]*(?:" +
+    [
+      /(?<kind>Geometry|Model): *(?<id>-?\d+), *"(?<name>[^"]*)", *"(?<type>[^"]*)"/,
+      /(?<array>Vertices|PolygonVertexIndex): *\*(?<count>\d+) *\{(?<body>[^}]*)/,
+      /(?<layer>LayerElement(?:Normal|UV|Color|Material)): *\d+ *\{/,
+      /(?<part>Normals|UV|UVIndex|Colors|ColorIndex|Materials): *\*/,
+      /(?<way>(?:Mapping|Reference)InformationType): *"(?<how>\w*)"/,
+      /C: *"OO", *(?<from>-?\d+), *(?<to>-?\d+)/,
+    ]
+      .map(({ source }) => source)
+      .join("|") +
+    ")",
+  "gm",
+);
+
 function textContents(file: string, text: string): Contents {
   const contents: Contents = { geometries: [], models: new Set(), connections: [] };
-  const whereIs = (at: number) => `${file}, line ${text.slice(0, at).split(/\r\n?|\n/).length}`;
-  checkBraces(file, text, whereIs);
-  const heads =
-    /^[ \t]*(?:(Geometry|Model): *(-?\d+), *"([^"]*)", *"([^"]*)"|(Vertices|PolygonVertexIndex): *\*(\d+) *\{([^}]*)|C: *"OO", *(-?\d+), *(-?\d+))/gm;
-  for (const { index, 1: kind, 2: id, 3: name, 4: type, 5: array, 6: count, 7: body, 8: part, 9: owner } of text.matchAll(
-    heads,
-  )) {
-    if (kind === "Model") contents.models.add(id!);
+  checkBraces(file, text);
+  let [line, counted] = [1, 0];
+  for (const { index, groups } of text.matchAll(heads)) {
+    const { kind, id = "", name = "", type = "", array, count, body = "", layer, part, way, how = "", from, to = "" } = groups!;
+    line += linesIn(text.slice(counted, index)) - 1;
+    counted = index;
+    const where = `${file}, line ${line}`;
+    if (kind === "Model") contents.models.add(id);
     if (kind === "Geometry" && !text.startsWith("\tGeometry", index)) {
-      throw new FileFault(`${whereIs(index)}: “Geometry” is not indented by one tab, as this page wants it.`);
+      throw new FileFault(`${where}: “Geometry” is not indented by one tab, as this page wants it.`);
     }
-    if (kind === "Geometry") contents.geometries.push({ where: whereIs(index), id: id!, name: plainName(name!), kind: type! });
-    if (part) contents.connections.push([part, owner!]);
+    if (kind === "Geometry") contents.geometries.push({ where, id, name: plainName(name), kind: type, layers: [] });
+    if (from) contents.connections.push([from, to]);
     const geometry = contents.geometries.at(-1);
-    if (!array || !geometry) continue;
-    const words = body!
-      .replace(/^\s*a:/, "")
-      .split(",")
-      .map((word) => word.trim());
-    if (words.at(-1) === "") words.pop();
-    const numbers = { where: whereIs(index), count: Number(count), values: words.map((word) => (word ? Number(word) : NaN)) };
-    if (array === "Vertices") geometry.places = numbers;
-    else geometry.corners = numbers;
+    if (!geometry) continue;
+    if (array === "Vertices") geometry.places = { where, count: Number(count), values: numbersIn(body) };
+    if (array === "PolygonVertexIndex") geometry.corners = { where, count: Number(count), values: numbersIn(body) };
+    if (layer) geometry.layers.push(layerOf(where, layer));
+    if (part) geometry.layers.at(-1)?.parts.add(part);
+    if (way) geometry.layers.at(-1)?.ways.add(how);
   }
   return contents;
 }
 
-function checkBraces(file: string, text: string, whereIs: (at: number) => string): void {
+const linesIn = (text: string) => text.split(/\r\n?|\n/).length;
+
+function numbersIn(body: string): number[] {
+  const words = body.replace(/^\s*a:/, "").split(",");
+  if (words.at(-1)!.trim() === "") words.pop();
+  return words.map((word) => (word.trim() ? Number(word) : NaN));
+}
+
+function checkBraces(file: string, text: string): void {
+  const whereIs = (at: number) => `${file}, line ${linesIn(text.slice(0, at))}`;
   const open: number[] = [];
   for (const { 0: sign, index } of text.matchAll(/"[^"]*"|;[^\n]*|[{}]/g)) {
     if (sign === "{") open.push(index);
