@@ -31,8 +31,9 @@ struct MeshFile {
 /// (ASCII, binary). Polygons become fans of triangles around their first vertex; faces of fewer than three vertices are
 /// left out. STL corners with equal coordinates (0 and -0 are equal) become one vertex, in order of first appearance.
 /// In all other formats the vertex order is that of the file. Errors: NOT_FOUND (MESH_FILE_NOT_FOUND), INVALID_ARGUMENT
-/// (MESH_FORMAT_UNKNOWN, MESH_SYNTAX with the line or byte). Does not check the mesh: NaN coordinates and wrong indices
-/// are returned as they are; check_mesh reports them.
+/// (MESH_FORMAT_UNKNOWN; MESH_SYNTAX with the line or byte, also for coordinates that are not finite and for corners whose
+/// vertex is not there, with the vertex and the face as the file counts them). The mesh may have all other defects:
+/// check_mesh reports them.
 absl::StatusOr<MeshFile> read_mesh(const std::filesystem::path& path);
 
 /// The same from memory.

@@ -1,5 +1,6 @@
 #include <limits>
 
+#include "absl/strings/str_cat.h"
 #include "core/io/readers.h"
 #include "core/io/text_scanner.h"
 
@@ -10,6 +11,10 @@ absl::Status read_vertex(TextScanner& scanner, MeshBuilder& builder) {
   const auto x = to_number(scanner.next_on_line()), y = to_number(scanner.next_on_line()),
              z = to_number(scanner.next_on_line());
   if (!x || !y || !z) return scanner.error("a v line needs three numbers");
+  if (!are_finite(*x, *y, *z)) {
+    return scanner.error(
+        absl::StrCat("vertex ", builder.vertices() + 1, " has a NaN or infinite coordinate"));
+  }
   builder.add_vertex(*x, *y, *z);
   return absl::OkStatus();
 }
@@ -21,10 +26,14 @@ std::int32_t to_zero_based(std::int32_t number, std::int64_t vertices) {
   return static_cast<std::int32_t>(std::max<std::int64_t>(index, std::numeric_limits<std::int32_t>::min()));
 }
 
+std::optional<std::int32_t> vertex_number(std::string_view corner) {
+  return to_index(corner.substr(0, corner.find('/')));
+}
+
 absl::Status read_face(TextScanner& scanner, std::vector<std::int32_t>& corners, MeshBuilder& builder) {
   corners.clear();
   for (std::string_view word = scanner.next_on_line(); !word.empty(); word = scanner.next_on_line()) {
-    const auto number = to_index(word.substr(0, word.find('/')));
+    const auto number = vertex_number(word);
     if (!number) return scanner.error("a corner of an f line starts with a vertex number");
     if (*number == 0) return scanner.error("an f line names vertex 0, and the first vertex is 1");
     corners.push_back(to_zero_based(*number, builder.vertices()));
@@ -32,6 +41,33 @@ absl::Status read_face(TextScanner& scanner, std::vector<std::int32_t>& corners,
   if (corners.size() < 3) return scanner.error("an f line needs at least three corners");
   builder.add_polygon(corners);
   return absl::OkStatus();
+}
+
+bool are_in_range(const TriangleMesh& mesh) {
+  return mesh.faces.size() == 0 ||
+         (mesh.faces.minCoeff() >= 0 && mesh.faces.maxCoeff() < mesh.vertices.rows());
+}
+
+/// Names the first corner whose vertex is not there. Only a second look finds it: a face may name vertices after it.
+absl::Status wrong_corner(std::string_view text, std::int64_t vertices) {
+  TextScanner scanner(text, TextScanner::LineEnds::kContinued);
+  std::int64_t before = 0, face = 0;
+  do {
+    const std::string_view keyword = scanner.next_on_line();
+    if (keyword == "v") ++before;
+    if (keyword != "f") continue;
+    ++face;
+    for (std::string_view word = scanner.next_on_line(); !word.empty(); word = scanner.next_on_line()) {
+      const std::int32_t number = vertex_number(word).value();
+      const std::int64_t index = to_zero_based(number, before);
+      if (index >= 0 && index < vertices) continue;
+      const std::string limit = number < 0 ? absl::StrCat(before, " vertices come before it")
+                                           : absl::StrCat("there are ", vertices, " vertices");
+      return scanner.error(absl::StrCat("face ", face, " has the corner \"",
+                                        std::string(word.substr(0, word.find('/'))), "\"; ", limit));
+    }
+  } while (scanner.skip_line());
+  return absl::InternalError("all corners are there");
 }
 
 }  // namespace
@@ -50,7 +86,9 @@ absl::StatusOr<TriangleMesh> parse_obj(std::string_view text) {
     if (keyword == "f") status = read_face(scanner, corners, builder);
     if (!status.ok()) return status;
   } while (scanner.skip_line());
-  return builder.mesh();
+  TriangleMesh mesh = builder.mesh();
+  if (!are_in_range(mesh)) return wrong_corner(text, mesh.vertices.rows());
+  return mesh;
 }
 
 }  // namespace lpdeform

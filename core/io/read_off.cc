@@ -44,6 +44,9 @@ absl::Status read_vertex(TextScanner& scanner, std::int32_t v, std::int32_t coun
   if (!x || !y || !z) {
     return scanner.error(absl::StrCat("vertex ", v, " of ", count, " needs three numbers"));
   }
+  if (!are_finite(*x, *y, *z)) {
+    return scanner.error(absl::StrCat("vertex ", v, " of ", count, " has a NaN or infinite coordinate"));
+  }
   builder.add_vertex(*x, *y, *z);
   scanner.skip_line();
   return absl::OkStatus();
@@ -57,9 +60,14 @@ absl::Status read_face(TextScanner& scanner, std::int32_t f, std::int32_t count,
   }
   corners.clear();
   for (std::int32_t k = 0; k < *size; ++k) {
-    const auto corner = to_index(scanner.next());
+    const std::string_view word = scanner.next();
+    const auto corner = to_index(word);
     if (!corner) {
       return scanner.error(absl::StrCat("face ", f, " of ", count, " needs ", *size, " vertex indices"));
+    }
+    if (*corner < 0 || *corner >= builder.vertices()) {
+      return scanner.error(absl::StrCat("face ", f, " of ", count, " has the corner ", std::string(word),
+                                        "; there are ", builder.vertices(), " vertices, counted from 0"));
     }
     corners.push_back(*corner);
   }

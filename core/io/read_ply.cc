@@ -1,8 +1,10 @@
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "absl/strings/str_cat.h"
 #include "core/io/byte_order.h"
+#include "core/io/number_text.h"
 #include "core/io/ply_header.h"
 #include "core/io/readers.h"
 #include "core/io/text_scanner.h"
@@ -10,19 +12,22 @@
 namespace lpdeform {
 namespace {
 
+constexpr std::int64_t kMostVertices = std::numeric_limits<std::int32_t>::max();
 constexpr double kLongestList = 4294967295.0;  // the largest number of the largest integer type
 
 /// Numbers of an ASCII file, one word each.
 class TextNumbers {
  public:
-  TextNumbers(std::string_view bytes, std::size_t begin) : scanner_(bytes.substr(begin)), begin_(begin) {}
+  TextNumbers(std::string_view bytes, std::size_t begin)
+      : scanner_(bytes.substr(begin)),
+        lines_before_(std::count(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(begin), '\n')) {}
 
   std::optional<double> next(PlyType) { return to_number(scanner_.next()); }
-  std::size_t position() const { return begin_ + scanner_.position(); }
+  std::string place() const { return absl::StrCat("line ", lines_before_ + scanner_.line()); }
 
  private:
   TextScanner scanner_;
-  std::size_t begin_;
+  std::int64_t lines_before_;
 };
 
 /// Numbers of a binary file.
@@ -52,7 +57,7 @@ class BinaryNumbers {
     }
     return std::nullopt;
   }
-  std::size_t position() const { return at_; }
+  std::string place() const { return absl::StrCat("byte ", at_); }
 
  private:
   template <typename Number>
@@ -67,14 +72,6 @@ class BinaryNumbers {
   std::size_t at_;
   std::endian order_;
 };
-
-/// An index that is not an integer becomes -1; one that does not fit becomes the nearest that does. Both are out of
-/// range.
-std::int32_t to_index(double number) {
-  using Limits = std::numeric_limits<std::int32_t>;
-  if (!(number == std::floor(number))) return -1;
-  return static_cast<std::int32_t>(std::clamp<double>(number, Limits::min(), Limits::max()));
-}
 
 /// The position of each of x, y, z among the properties of the vertices, or -1.
 std::array<int, 3> coordinate_places(const PlyElement& element) {
@@ -96,7 +93,7 @@ bool is_corner_list(const PlyProperty& property) {
 template <typename Numbers>
 class PlyData {
  public:
-  explicit PlyData(Numbers numbers) : numbers_(numbers) {}
+  PlyData(Numbers numbers, std::int64_t vertices) : numbers_(numbers), vertices_(vertices) {}
 
   absl::Status read(const PlyElement& element) {
     const bool is_vertex = element.name == "vertex", is_face = element.name == "face";
@@ -107,10 +104,17 @@ class PlyData {
     if (element.properties.empty()) return absl::OkStatus();
     for (std::int64_t row = 0; row < element.count; ++row) {
       for (std::size_t k = 0; k < element.properties.size(); ++k) {
-        if (!read_property(element.properties[k])) return broken_off(element, row, element.properties[k]);
-        if (is_face && is_corner_list(element.properties[k])) add_face();
+        if (!read_property(element.properties[k])) {
+          return wrong(element, row, absl::StrCat("lacks a valid ", element.properties[k].name));
+        }
+        if (!is_face || !is_corner_list(element.properties[k])) continue;
+        if (const absl::Status status = add_face(element, row); !status.ok()) return status;
       }
-      if (is_vertex) builder_.add_vertex(values_[places[0]], values_[places[1]], values_[places[2]]);
+      if (is_vertex) {
+        const double x = values_[places[0]], y = values_[places[1]], z = values_[places[2]];
+        if (!are_finite(x, y, z)) return wrong(element, row, "has a NaN or infinite coordinate");
+        builder_.add_vertex(x, y, z);
+      }
       values_.clear();
     }
     return absl::OkStatus();
@@ -136,19 +140,29 @@ class PlyData {
     return true;
   }
 
-  void add_face() {
+  absl::Status add_face(const PlyElement& element, std::int64_t row) {
     corners_.clear();
-    for (const double item : items_) corners_.push_back(to_index(item));
+    for (const double item : items_) {
+      if (!(item >= 0 && item < static_cast<double>(vertices_) && item == std::floor(item))) {
+        std::string corner;
+        append_number(corner, item);
+        return wrong(
+            element, row,
+            absl::StrCat("has the corner ", corner, "; there are ", vertices_, " vertices, counted from 0"));
+      }
+      corners_.push_back(static_cast<std::int32_t>(item));
+    }
     builder_.add_polygon(corners_);
+    return absl::OkStatus();
   }
 
-  absl::Status broken_off(const PlyElement& element, std::int64_t row, const PlyProperty& property) const {
-    return mesh_syntax(
-        absl::StrCat("byte ", numbers_.position()),
-        absl::StrCat(element.name, " ", row, " of ", element.count, " lacks a valid ", property.name));
+  absl::Status wrong(const PlyElement& element, std::int64_t row, std::string_view what) const {
+    return mesh_syntax(numbers_.place(),
+                       absl::StrCat(element.name, " ", row, " of ", element.count, " ", std::string(what)));
   }
 
   Numbers numbers_;
+  std::int64_t vertices_;  // in the whole file: faces may stand before them
   MeshBuilder builder_;
   std::vector<double> values_, items_;
   std::vector<std::int32_t> corners_;
@@ -158,10 +172,11 @@ template <typename Numbers>
 absl::StatusOr<TriangleMesh> read_elements(const PlyHeader& header, std::size_t bytes_left, Numbers numbers) {
   std::int64_t vertices = 0, faces = 0;
   for (const PlyElement& element : header.elements) {
-    if (element.name == "vertex") vertices = element.count;
+    if (element.name == "vertex")
+      vertices = std::min(kMostVertices, vertices + std::min(kMostVertices, element.count));
     if (element.name == "face") faces = element.count;
   }
-  PlyData<Numbers> data(numbers);
+  PlyData<Numbers> data(numbers, vertices);
   data.builder().reserve(vertices, faces, bytes_left);
   for (const PlyElement& element : header.elements) {
     if (const absl::Status status = data.read(element); !status.ok()) return status;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cctype>
@@ -16,6 +17,10 @@ namespace {
 constexpr std::size_t kHeadBytes = 84, kFaceBytes = 50, kNormalBytes = 12;
 
 using Corner = std::array<double, 3>;
+
+bool is_place(const Corner& corner) {
+  return are_finite(corner[0], corner[1], corner[2]);
+}
 
 /// Corners with the same coordinates become one vertex, in order of first appearance.
 class Welder {
@@ -68,6 +73,11 @@ absl::StatusOr<TriangleMesh> parse_binary(std::string_view bytes) {
     for (int k = 0; k < 9; ++k) {
       corners[k / 3][k % 3] = load_little_endian<float>(bytes.data() + at + kNormalBytes + 4 * k);
     }
+    if (!std::ranges::all_of(corners, is_place)) {
+      return mesh_syntax(absl::StrCat("byte ", at),
+                         absl::StrCat("face ", (at - kHeadBytes) / kFaceBytes,
+                                      ", counted from 0, has a NaN or infinite coordinate"));
+    }
     welder.add_face(corners);
   }
   return welder.mesh();
@@ -89,6 +99,7 @@ absl::Status read_loop(TextScanner& scanner, Welder& welder) {
       if (!number) return scanner.error("a vertex line needs three numbers");
       coordinate = *number;
     }
+    if (!is_place(corner)) return scanner.error("the vertex has a NaN or infinite coordinate");
   }
   if (lower_case(scanner.next()) != "endloop")
     return scanner.error("endloop is expected after three vertex lines");

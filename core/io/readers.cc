@@ -1,6 +1,7 @@
 #include "core/io/readers.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
@@ -24,6 +25,10 @@ absl::string_view view(std::string_view text) {
 absl::Status mesh_syntax(std::string_view where, std::string_view what) {
   return make_fault({Reason::kMeshSyntax, std::string(where), ""},
                     absl::StrCat(with_capital(where), ": ", view(what), "."));
+}
+
+bool are_finite(double x, double y, double z) {
+  return std::isfinite(x) && std::isfinite(y) && std::isfinite(z);
 }
 
 void MeshBuilder::reserve(std::int64_t vertices, std::int64_t faces, std::size_t bytes_left) {

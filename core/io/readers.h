@@ -23,6 +23,9 @@ absl::StatusOr<TriangleMesh> parse_stl(std::string_view bytes);
 /// INVALID_ARGUMENT (MESH_SYNTAX). `where` ("line 7", "byte 84") is the element and the beginning of the sentence.
 absl::Status mesh_syntax(std::string_view where, std::string_view what);
 
+/// Whether these coordinates are a place: none is NaN or infinite.
+bool are_finite(double x, double y, double z);
+
 /// Collects a mesh piece by piece.
 class MeshBuilder {
  public:

@@ -80,10 +80,12 @@ bool TextScanner::skip_line() {
   return at_ < text_.size();
 }
 
+std::int64_t TextScanner::line() const {
+  return 1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(last_word_), '\n');
+}
+
 absl::Status TextScanner::error(std::string_view what) const {
-  const auto line =
-      1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(last_word_), '\n');
-  return mesh_syntax(absl::StrCat("line ", line), what);
+  return mesh_syntax(absl::StrCat("line ", line()), what);
 }
 
 std::optional<double> to_number(std::string_view word) {

@@ -31,7 +31,10 @@ class TextScanner {
   /// How many bytes have been read.
   std::size_t position() const { return at_; }
 
-  /// MESH_SYNTAX at the line of the last word read: "Line 7: ...".
+  /// The line of the last word read, from 1.
+  std::int64_t line() const;
+
+  /// MESH_SYNTAX at that line: "Line 7: ...".
   absl::Status error(std::string_view what) const;
 
  private:

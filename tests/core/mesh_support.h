@@ -52,6 +52,11 @@ inline std::string refused_at(std::string_view text, MeshFormat format) {
   return fault.reason == "MESH_SYNTAX" ? fault.element : fault.reason;
 }
 
+/// The sentence with which `text` is refused.
+inline std::string refusal_of(std::string_view text, MeshFormat format) {
+  return std::string(parse_mesh(text, format).status().message());
+}
+
 /// An empty folder for one test, removed afterwards.
 class ScratchFolder {
  public:

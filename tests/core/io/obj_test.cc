@@ -9,6 +9,10 @@ std::string refused(std::string_view text) {
   return refused_at(text, MeshFormat::kObj);
 }
 
+std::string words_of(std::string_view text) {
+  return refusal_of(text, MeshFormat::kObj);
+}
+
 Faces faces_of(std::string_view text) {
   return parsed(text, MeshFormat::kObj).faces;
 }
@@ -34,9 +38,23 @@ TEST(Obj, CountsNegativeIndicesBackFromTheNewestVertex) {
   EXPECT_TRUE(same_faces(faces, kFan));
 }
 
-TEST(Obj, KeepsIndicesThatOthersWillJudge) {
-  const Faces faces = faces_of(square_with("f 6 1 5\nf -5 1 99999999999\n"));
-  EXPECT_TRUE(same_faces(faces, make_mesh({}, {{5, 0, 4}, {-1, 0, 2147483646}}).faces));
+TEST(Obj, AFaceMayNameVerticesThatComeAfterIt) {
+  const Faces faces = faces_of("v 0 0 0\nf 1 2 3 4\nv 1 0 0\nv 1 1 0\nv 0 1 0\n");
+  EXPECT_TRUE(same_faces(faces, kFan));
+}
+
+TEST(Obj, NamesACornerWhoseVertexIsNotThereAsTheFileCounts) {
+  EXPECT_EQ(words_of(square_with("f 1 2 3\n\nf 1 2 9/1\n")),
+            "Line 7: face 2 has the corner \"9\"; there are 4 vertices.");
+  EXPECT_EQ(words_of(square_with("f 1 2 \\\n99999999999\n")),
+            "Line 6: face 1 has the corner \"99999999999\"; there are 4 vertices.");
+  EXPECT_EQ(words_of("v 0 0 0\nv 1 0 0\nf -1 -2 -3\nv 0 1 0\n"),
+            "Line 3: face 1 has the corner \"-3\"; 2 vertices come before it.");
+}
+
+TEST(Obj, NamesAVertexThatIsNotFiniteAsTheFileCounts) {
+  EXPECT_EQ(words_of("v 0 0 0\n# one\nv 1 nan 0\n"), "Line 3: vertex 2 has a NaN or infinite coordinate.");
+  EXPECT_EQ(refused("v 1 1e999 0\n"), "line 1");
 }
 
 TEST(Obj, SkipsNumbersAfterTheThirdOfAVertex) {

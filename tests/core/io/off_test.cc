@@ -46,15 +46,25 @@ TEST(Off, CutsPolygonsIntoFansAndDropsPointsAndLines) {
   EXPECT_TRUE(same_faces(mesh.faces, make_mesh({}, {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}}).faces));
 }
 
-TEST(Off, KeepsIndicesAndNumbersThatOthersWillJudge) {
-  const TriangleMesh mesh = parsed(
-      "OFF\n3 2 0\nnan 0 0\n-inf 1e999 +1\n1e-999 -0 0\n3 0 1 3\n3 -1 99999999999 2\n", MeshFormat::kOff);
-  EXPECT_TRUE(std::isnan(mesh.vertices(0, 0)));
-  EXPECT_EQ(mesh.vertices(1, 0), -std::numeric_limits<double>::infinity());
-  EXPECT_EQ(mesh.vertices(1, 1), std::numeric_limits<double>::infinity());
-  EXPECT_EQ(mesh.vertices(1, 2), 1);
-  EXPECT_EQ(mesh.vertices(2, 0), 0);
-  EXPECT_TRUE(same_faces(mesh.faces, make_mesh({}, {{0, 1, 3}, {-1, 2147483647, 2}}).faces));
+TEST(Off, ReadsPlusSignsAndNumbersTooSmallForADouble) {
+  const TriangleMesh mesh = parsed("OFF\n1 0 0\n1e-999 -0 +1\n", MeshFormat::kOff);
+  EXPECT_EQ(mesh.vertices(0, 0), 0);
+  EXPECT_EQ(mesh.vertices(0, 2), 1);
+}
+
+TEST(Off, NamesACornerWhoseVertexIsNotThereAsTheFileCounts) {
+  const std::string vertices = "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  for (const std::string corner : {"3", "-1", "99999999999"}) {
+    EXPECT_EQ(refusal_of(vertices + "3 0 1 " + corner + "\n", MeshFormat::kOff),
+              "Line 7: face 1 of 2 has the corner " + corner + "; there are 3 vertices, counted from 0.");
+  }
+}
+
+TEST(Off, NamesAVertexThatIsNotFinite) {
+  for (const std::string number : {"nan", "-inf", "1e999"}) {
+    EXPECT_EQ(refusal_of("OFF\n2 0 0\n0 0 0\n0 " + number + " 0\n", MeshFormat::kOff),
+              "Line 4: vertex 1 of 2 has a NaN or infinite coordinate.");
+  }
 }
 
 TEST(Off, RefusesWhatIsNoOffFile) {

@@ -105,16 +105,35 @@ TEST(Ply, CutsPolygonsIntoFans) {
   EXPECT_TRUE(same_faces(mesh.faces, make_mesh({}, {{0, 1, 2}, {0, 2, 3}}).faces));
 }
 
-TEST(Ply, KeepsIndicesAndNumbersThatOthersWillJudge) {
-  const TriangleMesh mesh =
-      parsed(head("ascii",
-                  "element vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
-                  "element face 1\nproperty list uchar uint vertex_indices\n") +
-                 "nan inf 0\n3 4294967295 -3 0.5\n",
-             MeshFormat::kPly);
-  EXPECT_TRUE(std::isnan(mesh.vertices(0, 0)));
-  EXPECT_TRUE(std::isinf(mesh.vertices(0, 1)));
-  EXPECT_TRUE(same_faces(mesh.faces, make_mesh({}, {{2147483647, -3, -1}}).faces));
+TEST(Ply, NamesACornerWhoseVertexIsNotThereAsTheFileCounts) {
+  for (const std::string corner : {"3", "-1", "0.5", "4294967295", "nan"}) {
+    EXPECT_EQ(refusal_of(head("ascii", kTriangleLines) + "0 0 0\n1 0 0\n0 1.5 -0.25\n3 0 1 " + corner + "\n",
+                         MeshFormat::kPly),
+              "Line 13: face 0 of 1 has the corner " + corner + "; there are 3 vertices, counted from 0.");
+  }
+}
+
+TEST(Ply, NamesABinaryCornerWhoseVertexIsNotThere) {
+  std::string bytes = binary_triangle(std::endian::little);
+  const std::size_t end = bytes.size();
+  bytes[end - 4] = 7;
+  EXPECT_EQ(refusal_of(bytes, MeshFormat::kPly),
+            "Byte " + std::to_string(end) +
+                ": face 0 of 1 has the corner 7; there are 3 vertices, counted from 0.");
+}
+
+TEST(Ply, FacesMayStandBeforeTheirVertices) {
+  const std::string lines = head("ascii",
+                                 "element face 1\nproperty list uchar int vertex_indices\nelement vertex 3\n"
+                                 "property int x\nproperty int y\nproperty int z\n");
+  const std::string vertices = "0 0 0\n1 0 0\n0 1 0\n";
+  EXPECT_EQ(parsed(lines + "3 0 1 2\n" + vertices, MeshFormat::kPly).faces.rows(), 1);
+  EXPECT_EQ(refused(lines + "3 0 1 3\n" + vertices), "line 10");
+}
+
+TEST(Ply, NamesAVertexThatIsNotFinite) {
+  EXPECT_EQ(refusal_of(head("ascii", kTriangleLines) + "0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n", MeshFormat::kPly),
+            "Line 11: vertex 1 of 3 has a NaN or infinite coordinate.");
 }
 
 TEST(Ply, RefusesHeadersThatMakeNoSense) {

@@ -74,12 +74,20 @@ TEST(Stl, DoesNotWeldWhatIsOnlyNear) {
   EXPECT_EQ(mesh.vertices.rows(), 3);
 }
 
-TEST(Stl, KeepsFacesWithoutAreaAndNumbersThatOthersWillJudge) {
-  const float nan = std::numeric_limits<float>::quiet_NaN();
-  const TriangleMesh mesh = parsed(binary({{{{0, 0, 0}, {0, 0, 0}, {nan, 1, 0}}}}, 1), MeshFormat::kStl);
+TEST(Stl, KeepsFacesWithoutArea) {
+  const TriangleMesh mesh = parsed(binary({{{{0, 0, 0}, {0, 0, 0}, {0, 1, 0}}}}, 1), MeshFormat::kStl);
   EXPECT_EQ(mesh.faces.rows(), 1);
   EXPECT_EQ(mesh.faces(0, 0), mesh.faces(0, 1));
-  EXPECT_TRUE(std::isnan(mesh.vertices(1, 0)));
+}
+
+TEST(Stl, NamesAFaceThatIsNotFinite) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::string bytes =
+      binary({{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}, {{{0, 0, 0}, {0, 0, 1}, {nan, 1, 0}}}}, 2);
+  EXPECT_EQ(refusal_of(bytes, MeshFormat::kStl),
+            "Byte 134: face 1, counted from 0, has a NaN or infinite coordinate.");
+  EXPECT_EQ(refusal_of("solid a\n" + facet("0 0 0", "1 0 0", "0 inf 0") + "endsolid\n", MeshFormat::kStl),
+            "Line 6: the vertex has a NaN or infinite coordinate.");
 }
 
 TEST(Stl, RefusesBinaryFilesThatEndEarly) {

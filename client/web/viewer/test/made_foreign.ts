@@ -96,29 +96,73 @@ Connections:  {
 `;
 }
 
-/** A binary FBX of this version without a mesh: a node with a few properties, and in it one for each of `counts`, of packed truths. */
-export function makeBinaryFbx(version: number, ...counts: number[]): Buffer {
-  const number = (value: number) => Buffer.from(Uint32Array.of(value).buffer);
-  const field = (value: number) => (version >= 7500 ? Buffer.from(BigUint64Array.of(BigInt(value)).buffer) : number(value));
-  const node = (name: string, count: number, properties: Buffer) =>
-    Buffer.concat([
-      field(1e6),
-      field(count),
-      field(properties.length),
-      Buffer.from([name.length]),
-      Buffer.from(name),
-      properties,
-    ]);
-  const truths = (count: number) => {
-    const packed = deflateSync(new Uint8Array(count));
-    return Buffer.concat([Buffer.from("b"), number(count), number(1), number(packed.length), packed]);
+/** A node of a binary FBX, with all that stands in it. */
+interface Node {
+  name: string;
+  properties?: Buffer[];
+  children?: Node[];
+}
+
+const number = (value: number) => Buffer.from(Uint32Array.of(value).buffer);
+const textProperty = (text: string) => Buffer.concat([Buffer.from("S"), number(text.length), Buffer.from(text)]);
+const idProperty = (id: number) => Buffer.concat([Buffer.from("L"), Buffer.from(BigInt64Array.of(BigInt(id)).buffer)]);
+
+function arrayProperty(type: "b" | "d" | "i", items: Uint8Array | Float64Array | Int32Array): Buffer {
+  const packed = deflateSync(new Uint8Array(items.buffer));
+  return Buffer.concat([Buffer.from(type), number(items.length), number(1), number(packed.length), packed]);
+}
+
+function makeBinary(version: number, nodes: readonly Node[]): Buffer {
+  const isLong = version >= 7500;
+  const field = (value: number) => (isLong ? Buffer.from(BigUint64Array.of(BigInt(value)).buffer) : number(value));
+  const nothing = Buffer.alloc(isLong ? 25 : 13);
+  const node = ({ name, properties = [], children = [] }: Node, at: number): Buffer => {
+    const own = Buffer.concat([Buffer.from([name.length]), Buffer.from(name), ...properties]);
+    let inner = Buffer.alloc(0);
+    const begin = at + nothing.length - 1 + own.length;
+    for (const child of children) inner = Buffer.concat([inner, node(child, begin + inner.length)]);
+    if (children.length > 0) inner = Buffer.concat([inner, nothing]);
+    const sizes = [begin + inner.length, properties.length, Buffer.concat(properties).length];
+    return Buffer.concat([...sizes.map(field), own, inner]);
   };
-  return Buffer.concat([
-    Buffer.from("Kaydara FBX Binary  \0\x1a\0"),
-    number(version),
-    node("Objects", 4, Buffer.concat([Buffer.from("S"), number(3), Buffer.from("abcC\x01D12345678R"), number(0)])),
-    ...counts.map((count) => node("Truths", 1, truths(count))),
-    Buffer.alloc(300),
+  let all = Buffer.concat([Buffer.from("Kaydara FBX Binary  \0\x1a\0"), number(version)]);
+  for (const one of nodes) all = Buffer.concat([all, node(one, all.length)]);
+  return Buffer.concat([all, Buffer.alloc(300)]);
+}
+
+/** A binary FBX of this version without a mesh: a node with a few properties, and one for each of `counts`, of packed truths. */
+export function makeBinaryFbx(version: number, ...counts: number[]): Buffer {
+  const odd = [textProperty("abc"), Buffer.from("C\x01"), Buffer.from("D12345678"), Buffer.from("R\0\0\0\0")];
+  const truths = (count: number) => ({ name: "Truths", properties: [arrayProperty("b", new Uint8Array(count))] });
+  return makeBinary(version, [{ name: "Objects", properties: odd }, ...counts.map(truths)]);
+}
+
+/** A tube as in makeFbx(), in binary. */
+export function makeBinaryTube(version: number, { points, triangles } = small): Buffer {
+  const places = Float64Array.from(points.flatMap(([x, y, z]) => [x!, z!, -y!]));
+  const corners = Int32Array.from(triangles.flatMap(([a, b, c]) => [a!, b!, -c! - 1]));
+  const called = (name: string) => textProperty(`${name}\0\x01Geometry`);
+  const link = (part: number, owner: number) => ({
+    name: "C",
+    properties: [textProperty("OO"), idProperty(part), idProperty(owner)],
+  });
+  return makeBinary(version, [
+    { name: "GlobalSettings", children: [{ name: "Version", properties: [idProperty(1000)] }] },
+    {
+      name: "Objects",
+      children: [
+        {
+          name: "Geometry",
+          properties: [idProperty(1001), called("tube"), textProperty("Mesh")],
+          children: [
+            { name: "Vertices", properties: [arrayProperty("d", places)] },
+            { name: "PolygonVertexIndex", properties: [arrayProperty("i", corners)] },
+          ],
+        },
+        { name: "Model", properties: [idProperty(1002), called("pipe"), textProperty("Mesh")] },
+      ],
+    },
+    { name: "Connections", children: [link(1002, 0), link(1001, 1002)] },
   ]);
 }
 

@@ -1,6 +1,9 @@
 import { LoadingManager, type Material, Mesh, MeshStandardMaterial, type MeshPhongMaterial, type Object3D } from "three";
 import { FileFault } from "lpdeform-client/mesh/fault";
 import { utf16Of } from "lpdeform-client/mesh/encodings";
+import { checkDae } from "./dae_faults.js";
+import { checkFbx } from "./fbx_faults.js";
+import { check3mf } from "./threemf_faults.js";
 import { checkUnpackedFbx, checkUnpackedZip } from "./unpacked.js";
 
 // FBX, COLLADA and 3MF, as three.js reads them. They become a GLB, which is opened as any other, with names, colours, texture
@@ -21,9 +24,9 @@ export async function glbIn(file: File): Promise<Converted> {
   const kind = name.toLowerCase().split(".").at(-1) as Kind;
   const bytes = new Uint8Array(await file.arrayBuffer());
   try {
-    const scene = await quietly(() => readers[kind](bytes));
-    if (!hasTriangles(scene)) throw new FileFault(`${name} has no triangles.`);
-    const left = simplify(scene);
+    const scene = await quietly(() => readers[kind](name, bytes));
+    if (!hasTriangles(scene)) throw new FileFault(`${name} has no triangles${onlyLines(scene)}.`);
+    const left = [...checkedNumbers(name, scene), ...simplify(scene)];
     const { GLTFExporter } = await import("three/addons/exporters/GLTFExporter.js");
     const glb = await quietly(() => new GLTFExporter().parseAsync(scene, { binary: true, onlyVisible: false }));
     return { glb: glb as ArrayBuffer, left };
@@ -33,20 +36,24 @@ export async function glbIn(file: File): Promise<Converted> {
   }
 }
 
-const readers: Record<Kind, (bytes: Uint8Array<ArrayBuffer>) => Promise<Object3D>> = {
-  async fbx(bytes) {
+const readers: Record<Kind, (name: string, bytes: Uint8Array<ArrayBuffer>) => Promise<Object3D>> = {
+  async fbx(name, bytes) {
     await checkUnpackedFbx(bytes);
+    checkFbx(name, bytes);
     const { FBXLoader } = await import("three/addons/loaders/FBXLoader.js");
     return new FBXLoader(nothingElse()).parse(bytes.buffer, "");
   },
-  async dae(bytes) {
+  async dae(name, bytes) {
     const { ColladaLoader } = await import("three/addons/loaders/ColladaLoader.js");
-    const read = new ColladaLoader(nothingElse()).parse(xmlText(bytes), "");
+    const text = xmlText(bytes);
+    checkDae(name, text);
+    const read = new ColladaLoader(nothingElse()).parse(text, "");
     if (!read?.scene) throw new Error("its XML is broken");
     return read.scene;
   },
-  async "3mf"(bytes) {
+  async "3mf"(name, bytes) {
     await checkUnpackedZip(bytes);
+    await check3mf(name, bytes);
     const { ThreeMFLoader } = await import("three/addons/loaders/3MFLoader.js");
     const scene = new ThreeMFLoader(nothingElse()).parse(bytes.buffer) as Object3D | null;
     if (!scene) throw new Error("its parts are not those of a 3MF file");
@@ -96,6 +103,51 @@ function hasTriangles(scene: Object3D): boolean {
     most = Math.max(most, index?.count ?? attributes["position"]?.count ?? 0);
   });
   return most >= 3;
+}
+
+/** What the scene has in place of triangles. */
+function onlyLines(scene: Object3D): string {
+  const names: string[] = [];
+  scene.traverse((object) => {
+    if ("isLine" in object) names.push(`“${calledIn(object)}”`);
+  });
+  return names.length > 0 ? `, only the lines ${names.join(", ")}` : "";
+}
+
+/** A name that the file has: of the object, or of one in which it stands. */
+function calledIn(object: Object3D): string {
+  return object.name || (object.parent ? calledIn(object.parent) : "");
+}
+
+/** Attributes of vertices that can be left out, in words. */
+const dispensable: readonly (readonly [RegExp, string])[] = [
+  [/^normal$/, "normals"],
+  [/^tangent$/, "tangents"],
+  [/^uv\d*$/, "texture coordinates"],
+  [/^color$/, "colours"],
+];
+
+const isFinite = ({ array }: { array: ArrayLike<number> }) => Array.prototype.every.call(array, Number.isFinite);
+
+/** Leaves out what is no number and can be spared, and returns what that is. Throws a FileFault for all else. */
+function checkedNumbers(name: string, scene: Object3D): readonly string[] {
+  const left = new Set<string>();
+  scene.updateMatrixWorld(true);
+  scene.traverse((object) => {
+    const fault = (what: string) => new FileFault(`${name}: “${calledIn(object)}” has ${what} that is no finite number.`);
+    if (!object.matrixWorld.elements.every(Number.isFinite)) throw fault("a place, a turn or a size");
+    if (!(object instanceof Mesh)) return;
+    const { geometry } = object as Mesh;
+    for (const [key, attribute] of Object.entries(geometry.attributes)) {
+      if (isFinite(attribute)) continue;
+      const found = dispensable.find(([pattern]) => pattern.test(key));
+      if (!found) throw fault(`a value “${key}” of a vertex`);
+      geometry.deleteAttribute(key);
+      left.add(`${found[1]} that are no numbers`);
+    }
+    if (!Object.values(geometry.morphAttributes).flat().every(isFinite)) throw fault("a value of a morph target");
+  });
+  return [...left];
 }
 
 /** Leaves plain colours of the materials, and no animations. Returns what is gone. */

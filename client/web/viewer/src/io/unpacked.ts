@@ -1,5 +1,7 @@
 // Compressed files that claim little and unpack to more than a page can hold are refused before the readers of three.js unpack them.
 
+import { fbxNodes, isBinaryFbx } from "./fbx_nodes.js";
+
 /** What is more than that, unpacked, is nothing that a page can show. */
 const mostBytes = 500e6;
 
@@ -19,45 +21,28 @@ export async function unpackedZipBytes(bytes: Uint8Array<ArrayBuffer>): Promise<
     size += originalSize;
     return false;
   };
-  unzipSync(bytes, { filter: measure });
+  try {
+    unzipSync(bytes, { filter: measure });
+  } catch {
+    throw new Error("the end of a ZIP file, where its parts are listed, is missing or damaged");
+  }
   return size;
 }
 
-const widths: Record<string, number> = { C: 1, Y: 2, I: 4, F: 4, D: 8, L: 8 };
-const elementWidths: Record<string, number> = { b: 1, c: 1, i: 4, f: 4, d: 8, l: 8 };
-/** The magic of an FBX file, before its version. */
-const headBytes = 23;
-/** What follows the last node. */
-const footBytes = 176;
-
 /** Of the arrays in a binary FBX file: each number of them takes eight bytes in the reader of three.js. */
 export async function checkUnpackedFbx(bytes: Uint8Array<ArrayBuffer>): Promise<void> {
-  if (!new TextDecoder().decode(bytes.subarray(0, headBytes)).startsWith("Kaydara FBX Binary")) return;
-  const view = new DataView(bytes.buffer);
-  const number = (at: number) => view.getUint32(at, true);
-  const isLong = number(headBytes) >= 7500;
-  const field = (at: number) => (isLong ? Number(view.getBigUint64(at, true)) : number(at));
-  const fieldBytes = isLong ? 8 : 4;
+  if (!isBinaryFbx(bytes)) return;
   let size = 0;
-  // Each node is its end, the count and the bytes of its properties, its name, and the properties. Its children follow.
-  for (let at = headBytes + 4; at + footBytes < bytes.length;) {
-    const count = field(at) === 0 ? 0 : field(at + fieldBytes);
-    const name = at + 3 * fieldBytes;
-    at = name + 1 + view.getUint8(name);
-    for (let k = 0; k < count; ++k) {
-      const type = String.fromCharCode(view.getUint8(at++));
-      const width = elementWidths[type];
-      if (!width) {
-        at += widths[type] ?? 4 + number(at);
-        continue;
+  try {
+    for (const { properties } of fbxNodes(bytes)) {
+      for (const { begin, end, width, isPacked } of properties) {
+        if (!isPacked) continue;
+        size += (8 / width) * (await unpackedBytes(bytes.subarray(begin, end), ((mostBytes - size) * width) / 8));
+        check(size);
       }
-      const [length, isPacked, packedBytes] = [number(at), number(at + 4) !== 0, number(at + 8)];
-      at += 12;
-      const end = at + (isPacked ? packedBytes : length * width);
-      if (isPacked) size += (8 / width) * (await unpackedBytes(bytes.subarray(at, end), ((mostBytes - size) * width) / 8));
-      check(size);
-      at = end;
     }
+  } catch (error) {
+    if (!(error instanceof RangeError)) throw error; // it ends too soon: checkFbx() says where
   }
 }
 

@@ -96,11 +96,11 @@ describe("the viewer", () => {
       "; FBX 6.1.0 project file\nFBXVersion: 6100\n",
       "a.fbx cannot be read as FBX: FBX version not supported, FileVersion: 6100.",
     ],
-    ["a.dae", "<COLLADA", "a.dae cannot be read as COLLADA: unclosed xml tag(s): COLLADA."],
+    ["a.dae", "<COLLADA", "a.dae ends too soon: the tag of line 1 has no end."],
     [
       "a.dae",
       '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"></COLLADA>',
-      "a.dae cannot be read as COLLADA: parts of it are missing or damaged.",
+      "a.dae, line 1: <COLLADA> has no <asset>.",
     ],
     ["a.3mf", "PK", "a.3mf cannot be read as 3MF"],
     ["a.3mf", Buffer.from(make3mf(501e6)), "a.3mf cannot be read as 3MF: unpacked it has 501"],

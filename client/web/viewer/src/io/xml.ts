@@ -1,0 +1,130 @@
+import { FileFault } from "lpdeform-client/mesh/fault";
+
+// As much of XML as is needed to say in which line of a file something is wrong. The readers of three.js have it read again.
+
+export interface Tag {
+  /** Without its prefix. */
+  name: string;
+  attributes: Readonly<Record<string, string>>;
+  /** Whether it is the end of an element; an element without contents has both a beginning and an end. */
+  isEnd: boolean;
+  /** Where it begins and ends in the text. */
+  at: number;
+  end: number;
+}
+
+export interface Element extends Tag {
+  children: Element[];
+  /** What stands in it, without elements and comments. */
+  text: string;
+}
+
+const tag = /<(\/?)([^\s/>!?<]+)((?:[^"'<>]|"[^"<]*"|'[^'<]*')*)>/y;
+const attribute = /([^\s=]+)\s*=\s*(?:"([^"]*)"|'([^']*)')/g;
+/** What is no element, by its beginning, and its end. */
+const others = [
+  ["<!--", "-->"],
+  ["<![CDATA[", "]]>"],
+  ["<?", "?>"],
+  ["<!", ">"],
+] as const;
+
+export class XmlText {
+  /** `name`: of the file, and of the part of it. */
+  constructor(
+    readonly name: string,
+    readonly text: string,
+  ) {}
+
+  fault(at: number, what: string): FileFault {
+    return new FileFault(`${this.name}, line ${this.lineOf(at)}: ${what}.`);
+  }
+
+  #cut(what: string): FileFault {
+    return new FileFault(`${this.name} ends too soon: ${what} has no end.`);
+  }
+
+  lineOf(at: number): number {
+    return this.text.slice(0, at).split(/\r\n?|\n/).length;
+  }
+
+  /** Throws a FileFault where an element does not end. */
+  *tags(): Generator<Tag> {
+    const { text } = this;
+    const open: { name: string; at: number }[] = [];
+    let hasRoot = false;
+    for (let at = text.indexOf("<"); at >= 0; at = text.indexOf("<", at)) {
+      const isOther = text[at + 1] === "!" || text[at + 1] === "?";
+      const other = isOther && others.find(([begin]) => text.startsWith(begin, at));
+      if (other) {
+        const end = text.indexOf(other[1], at + other[0].length);
+        if (end < 0) throw this.fault(at, `${other[0]} has no ${other[1]} after it`);
+        at = end + other[1].length;
+        continue;
+      }
+      tag.lastIndex = at;
+      const [whole, slash, full, inner] = tag.exec(text) ?? [];
+      if (whole === undefined && text.indexOf(">", at) < 0) throw this.#cut(`the tag of line ${this.lineOf(at)}`);
+      if (whole === undefined) throw this.fault(at, "the tag that begins here is broken");
+      const name = full!.slice(full!.indexOf(":") + 1);
+      const end = at + whole.length;
+      if (slash) {
+        const begin = open.pop();
+        if (begin?.name !== full) {
+          throw this.fault(at, `</${full}> ends ${begin ? `<${begin.name}> of line ${this.lineOf(begin.at)}` : "nothing"}`);
+        }
+        yield { name, attributes: {}, isEnd: true, at, end };
+      } else {
+        const attributes = attributesIn(inner!);
+        if (hasRoot && open.length === 0) throw this.fault(at, `<${full}> comes after the end of the XML`);
+        hasRoot = true;
+        yield { name, attributes, isEnd: false, at, end };
+        if (inner!.endsWith("/")) yield { name, attributes, isEnd: true, at: end, end };
+        else open.push({ name: full!, at });
+      }
+      at = end;
+    }
+    const last = open.at(-1);
+    if (last) throw this.#cut(`<${last.name}> of line ${this.lineOf(last.at)}`);
+  }
+
+  /** The outermost element. Throws a FileFault if there is none. */
+  root(): Element {
+    const top = { children: [] as Element[] };
+    const open: { children: Element[] }[] = [top];
+    for (const tag of this.tags()) {
+      if (tag.isEnd) {
+        const element = open.pop() as Element;
+        if (element.children.length === 0) element.text = this.text.slice(element.end, tag.at).replace(/<!--.*?-->/gs, " ");
+      } else {
+        const element = { ...tag, children: [], text: "" };
+        open.at(-1)!.children.push(element);
+        open.push(element);
+      }
+    }
+    if (!top.children[0]) throw new FileFault(`${this.name} has no XML element.`);
+    return top.children[0];
+  }
+}
+
+function attributesIn(text: string): Record<string, string> {
+  const found: Record<string, string> = {};
+  attribute.lastIndex = 0;
+  for (let one = attribute.exec(text); one; one = attribute.exec(text)) found[one[1]!] = one[2] ?? one[3]!;
+  return found;
+}
+
+/** An element and all that stand in it. */
+export function* elementsIn(element: Element): Generator<Element> {
+  yield element;
+  for (const child of element.children) yield* elementsIn(child);
+}
+
+export const wordsOf = (text: string): string[] =>
+  text
+    .trim()
+    .split(/\s+/)
+    .filter((word) => word !== "");
+
+/** Whether it is a finite number. */
+export const isNumber = (word: string): boolean => word.trim() !== "" && Number.isFinite(Number(word));
