@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <thread>
 #include <vector>
 
@@ -20,6 +21,8 @@
 #include "program.h"
 #include "redis_server.h"
 #include "server/admin/health_probe.h"
+
+#include <httplib.h>  // after Eigen, because resolv.h defines a macro of the name _res
 
 namespace lpdeform {
 namespace {
@@ -45,8 +48,9 @@ class ReplicasTest : public testing::Test {
     web_ = absl::StrCat("127.0.0.1:", free_port());
     envoy_ = std::make_unique<Program>(
         std::vector<std::string>{"--web", web_, "--server", absl::StrJoin(addresses_, ","), "--files", "none",
-                                 "--access-log", folder_ + "/access.log"},
+                                 "--access-log", folder_ + "/access.log", "--admin-file", folder_ + "/admin"},
         std::vector<std::string>{}, LPDEFORM_WEB_PROGRAM);
+    wait_for_envoy();
   }
 
   ~ReplicasTest() override {
@@ -63,6 +67,22 @@ class ReplicasTest : public testing::Test {
         "--log-level", "off", "--grace", "10"});
     addresses_[k] = servers_[k]->address();
     ASSERT_TRUE(is_serving(addresses_[k]));
+  }
+
+  /// Until Envoy knows that all servers are well.
+  void wait_for_envoy() const {
+    const auto end = Clock::now() + kPatience;
+    for (;;) {
+      std::string address;
+      std::ifstream(folder_ + "/admin") >> address;
+      const httplib::Result result =
+          httplib::Client("http://" + address).Get("/stats?filter=^cluster.lpdeform.membership_healthy$");
+      if (result &&
+          result->body == absl::StrCat("cluster.lpdeform.membership_healthy: ", servers_.size(), "\n"))
+        return;
+      if (Clock::now() > end) throw std::runtime_error(result ? result->body : "Envoy does not answer.");
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
   }
 
   /// Of a client of its own, once Envoy lets it reach a server.
