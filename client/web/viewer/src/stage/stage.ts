@@ -161,7 +161,7 @@ export class Stage {
     const whole = { left: 0, top: 0, right, bottom };
     // A part in the middle is better than one aside where the surface would be a little larger.
     const aside = ({ left, top, right: end, bottom: below }: Box) =>
-      Math.hypot((left + end) / right - 1, (top + below) / bottom - 1) / 2;
+      Math.hypot((left + end) / right - 1, (top + below) / bottom - 1);
     const free = freeRoom(whole, covers, (part) => -distanceIn(part) * (1 + aside(part)));
     this.#covered = { left: free.left, top: free.top, right: right - free.right, bottom: bottom - free.bottom };
     this.#center();
