@@ -4,7 +4,7 @@ import { mkdtempSync, rmSync } from "node:fs";
 import { loadavg, tmpdir } from "node:os";
 import { join } from "node:path";
 import { chromium } from "playwright-core";
-import { afterAll, beforeAll, expect, it } from "vitest";
+import { afterAll, beforeAll, it } from "vitest";
 import { percentile } from "lpdeform-client/mesh/statistics";
 import { Service } from "../../../client/test/support/service.js";
 import { type MeterFacts, launch } from "../real/user.js";
@@ -12,7 +12,7 @@ import { args, BarePage, stir } from "../real/bare_page.js";
 import { ringObj, ringVertex } from "../support/ring.js";
 
 const seconds = Number(process.env["SECONDS"] ?? 8);
-const files = join(import.meta.dirname, "../../dist");
+const files = process.env["FILES"] ?? join(import.meta.dirname, "../../dist"); // or another build of the page
 const folder = mkdtempSync(join(tmpdir(), "lpdeform-figures-"));
 const banners = ["| what happens | at rest | during a drag |", "|:--|--:|--:|"];
 const drags = [
@@ -41,6 +41,8 @@ async function opened(service: Service, query: string) {
   return { browser, page };
 }
 
+const longestMs = 20_000;
+
 const isSaid = `[...document.querySelectorAll(".banner")].some((one) => one.checkVisibility() && one.textContent.trim() !== "")`;
 
 const troubles: Record<string, (service: Service) => Promise<void> | void> = {
@@ -61,12 +63,14 @@ it.each(Object.entries(troubles))(
       if (isDragging) await page.mouse("mousePressed", at.x, at.y);
       await trouble(service);
       const begin = performance.now();
-      for (let k = 0; !(await page.evaluate(isSaid)); ++k) {
+      const passed = () => performance.now() - begin;
+      let isThere = false;
+      for (let k = 0; !isThere && passed() < longestMs; ++k) {
         if (isDragging) await page.mouse("mouseMoved", at.x + 60 * Math.sin(k / 20), at.y + 5, true);
         else await new Promise((again) => setTimeout(again, 10));
-        expect(performance.now() - begin).toBeLessThan(30_000);
+        isThere = await page.evaluate<boolean>(isSaid);
       }
-      times.push((performance.now() - begin).toFixed(0));
+      times.push(isThere ? passed().toFixed(0) : `not within ${longestMs}`);
       for (const part of ["server", "envoy"] as const) if (what.includes("SIGSTOP")) service.resume(part);
       await browser.close();
       await service.stop();
