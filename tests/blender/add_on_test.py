@@ -10,8 +10,8 @@ import typing
 import unittest
 from unittest import mock
 
+import bpy  # first: the module bpy brings the others
 import bmesh
-import bpy
 import numpy as np
 from mathutils import Matrix
 
@@ -616,6 +616,14 @@ class AddOn(unittest.TestCase):
             bpy.ops.lpdeform.start()
         self.assertIsNone(self.tube.data.shape_keys)
         self.assertIsNone(live.of(self.tube))
+
+    def test_a_blender_without_grpcio_is_said_and_changes_nothing(self):
+        stage.add_handle(self.tube, self.top)
+        stage.activate(self.tube)
+        with mock.patch.dict(sys.modules, {"grpc": None}), \
+                self.assertRaisesRegex(RuntimeError, "grpcio and protobuf cannot be used.*install python3-grpcio"):
+            bpy.ops.lpdeform.start()
+        self.assertIsNone(self.tube.data.shape_keys)
 
     def test_a_server_that_comes_back_is_gone_on_with(self):
         _, tip = self.held()

@@ -6,8 +6,8 @@ import unittest
 from types import SimpleNamespace
 from unittest import mock
 
+import bpy  # first: the module bpy brings the others
 import bmesh
-import bpy
 import numpy as np
 from mathutils import Matrix
 

@@ -1,7 +1,7 @@
 """Shared by the tests in Blender: the add-on installed from its zip, a server, shapes, and a function that runs Blender's timers,
 which do not run by themselves without a window.
 
-Run as: blender ... --python TEST.py -- ADD_ON.zip SERVER PICTURES
+Run as: blender ... --python TEST.py -- ADD_ON.zip SERVER PICTURES, or with the module bpy: python TEST.py -- ADD_ON.zip ...
 """
 
 import base64
@@ -55,7 +55,9 @@ def token_of(subject, key):
 
 def install():
     """Enables the add-on, for `from lpdeform_addon import ...`, and returns its preferences."""
-    if IS_EXTENSION:  # tests/blender/run has installed it
+    if IS_EXTENSION:  # tests/blender/run has installed it in a program
+        if not bpy.app.binary_path:  # the module bpy, which has no command line and keeps no preferences
+            bpy.ops.extensions.package_install_files(filepath=ADD_ON, repo="user_default", enable_on_install=True)
         sys.modules["lpdeform_addon"] = sys.modules[MODULE]
     else:
         bpy.ops.preferences.addon_install(filepath=ADD_ON)
@@ -94,10 +96,11 @@ def tube(name="tube", around=24, along=61, radius=0.4, length=4.0, at=(0.0, 0.0,
 def select(ob, vertices, faces=()):
     """As a person does in Edit mode, where it is left."""
     activate(ob)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="DESELECT")  # Blender 5.0.1 crashes where a script sets `select` of edges
+    bpy.ops.object.mode_set(mode="OBJECT")
     mask = np.zeros(len(ob.data.vertices), bool)
     mask[vertices] = True
-    for elements in (ob.data.edges, ob.data.polygons):
-        elements.foreach_set("select", np.zeros(len(elements), bool))
     for face in faces:
         ob.data.polygons[face].select = True
         mask[list(ob.data.polygons[face].vertices)] = True

@@ -1,15 +1,10 @@
-"""The package lpdeform, if it can be imported, and the server's address."""
+"""The package lpdeform, what it needs to reach a server, and the server's address."""
 
 import os
 import re
 
 import bpy
-
-try:
-    import lpdeform
-except ImportError as missing:
-    lpdeform = None
-    _missing = str(missing)
+import lpdeform
 
 
 class NotReady(Exception):
@@ -17,11 +12,14 @@ class NotReady(Exception):
 
 
 def require() -> None:
-    if lpdeform is None:
+    try:
+        import google.protobuf  # noqa: F401
+        import grpc  # noqa: F401
+    except ImportError as missing:
         raise NotReady(
-            f"The Python package of lpdeform cannot be used ({_missing}). With Debian's Blender install python3-grpcio and "
-            "python3-protobuf; otherwise use Blender 4.2 or newer and the extension that client/blender/package --for packs."
-        )
+            f"grpcio and protobuf cannot be used ({missing}). With Debian's Blender install python3-grpcio and python3-protobuf; "
+            "otherwise use Blender 4.2 or newer and the extension that client/blender/package --for packs."
+        ) from missing
     if not getattr(bpy.app, "online_access", True) and not _is_on_this_machine(address()):
         raise NotReady(
             f"Blender may not go online, and {address()} is another machine. Allow online access in Preferences > System, or use a server "
