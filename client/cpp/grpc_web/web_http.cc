@@ -113,7 +113,8 @@ class Exchange {
 #ifdef _WIN32
     if (!objection_.empty()) return events_.end(absl::UnavailableError(objection_));
 #endif
-    const std::string text = error_[0] != '\0' ? error_ : curl_easy_strerror(code);
+    const absl::string_view text =
+        absl::StripTrailingAsciiWhitespace(error_[0] != '\0' ? error_ : curl_easy_strerror(code));
     curl_off_t sent_after = 0;
     if (easy_) curl_easy_getinfo(easy_.get(), CURLINFO_PRETRANSFER_TIME_T, &sent_after);
     if (code == CURLE_OPERATION_TIMEDOUT && sent_after > 0)
