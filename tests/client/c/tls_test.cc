@@ -13,14 +13,15 @@
 namespace lpdeform::engine {
 namespace {
 
-// In the words of OpenSSL, of Mbed TLS, of libcurl for Schannel, and of this library on Windows.
+// In the words of OpenSSL, of Mbed TLS 2 and 3, of libcurl for Schannel, and of this library on Windows.
 const auto kSaysUntrusted =
     testing::AnyOf(testing::HasSubstr("SSL certificate problem"), testing::HasSubstr("Cert verify failed"),
+                   testing::HasSubstr("is not correctly signed by the trusted CA"),
                    testing::HasSubstr("UNTRUSTED_ROOT"), testing::HasSubstr("certificate is not trusted"));
 const auto kSaysOtherHost = testing::AnyOf(
     testing::HasSubstr("no alternative certificate subject name matches"),
-    testing::HasSubstr("BADCERT_CN_MISMATCH"), testing::HasSubstr("failed to match connection hostname"),
-    testing::HasSubstr("it is for another host"));
+    testing::HasSubstr("BADCERT_CN_MISMATCH"), testing::HasSubstr("Common Name (CN) does not match"),
+    testing::HasSubstr("failed to match connection hostname"), testing::HasSubstr("it is for another host"));
 
 class CTlsTest : public testing::Test {
  protected:
