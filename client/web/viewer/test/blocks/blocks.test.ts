@@ -122,11 +122,11 @@ function watchDrag(): void {
   const [pane] = app.panes;
   const take = pane.takeFrame.bind(pane);
   const sampled = Array.from({ length: 50 }, (_, k) => Math.floor((k * app.mesh.positions.length) / 150));
-  const placesOnPage = () => sampled.map((vertex) => pointOnPage(pane.stage.surface.placeOf(vertex).toArray()));
-  let expected: { x: number; y: number }[] | undefined;
+  const sample = () => sampled.map((vertex) => pane.stage.surface.placeOf(vertex).toArray());
+  let expected: number[][] | undefined;
   pane.takeFrame = () => {
     pane.lookAhead(app.document, true);
-    const before = placesOnPage();
+    const before = sample();
     const isNew = take();
     if (isNew) performance.mark("frame-taken");
     expected = isNew ? before : undefined;
@@ -142,17 +142,18 @@ function watchDrag(): void {
     begin ??= now;
     drag.seconds = (now - begin) / 1000;
     ++drag.pictures;
-    if (expected) {
-      const now = placesOnPage();
-      drag.corrections.push(Math.max(...expected.map(({ x, y }, k) => Math.hypot(now[k]!.x - x, now[k]!.y - y))));
-    }
     const [vertex] = vertices;
     const rest = app.mesh.positions.slice(3 * vertex, 3 * vertex + 3);
+    const jump = expected && [expected, sample()];
     const places = [[0, 1, 2].map((axis) => rest[axis] + pose.translation[axis]), pane.stage.surface.placeOf(vertex).toArray()];
     // In a task of its own, because it is not the page's.
     setTimeout(() => {
-      const [wanted, drawn] = places.map((place) => pointOnPage(place));
-      drag.gaps.push(Math.hypot(wanted.x - drawn.x, wanted.y - drawn.y));
+      const gap = ([from, to]: number[][]) => {
+        const [one, other] = [pointOnPage(from), pointOnPage(to)];
+        return Math.hypot(one.x - other.x, one.y - other.y);
+      };
+      drag.gaps.push(gap(places));
+      if (jump) drag.corrections.push(Math.max(...jump[0]!.map((from, k) => gap([from, jump[1]![k]!]))));
     });
   });
 }
