@@ -93,7 +93,7 @@ class ReplicasTest : public testing::Test {
       auto session = client.ok() ? client->open(mesh) : client.status();
       if (session.ok()) return *std::move(session);
       if (Clock::now() > end) throw std::runtime_error(session.status().ToString());
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));  // nothing tells when Envoy is ready
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
   }
 

@@ -77,14 +77,9 @@ public sealed class LpdeformMesh : MonoBehaviour
             return;
         }
         session.Noticed += notice => { if (notice.Reason != NoticeReason.None) Debug.Log("lpdeform: " + notice.Text, this); };
-        try
-        {
-            foreach (var handle in handles) Hold(handle);
-        }
-        catch (LpdeformException error)
-        {
-            Warn(error);
-        }
+        foreach (var handle in handles) handle.holds = false;
+        foreach (var handle in handles)
+            if (session != null) Hold(handle);
     }
 
     void Remember(UnityEngine.Mesh present)
@@ -99,7 +94,6 @@ public sealed class LpdeformMesh : MonoBehaviour
 
     void Hold(HandleObject handle)
     {
-        handle.holds = false;
         if (string.IsNullOrEmpty(handle.name) || handle.transform == null)
         {
             Debug.LogWarning("Handle " + Array.IndexOf(handles, handle) + " has no name or no object", this);
@@ -110,9 +104,20 @@ public sealed class LpdeformMesh : MonoBehaviour
         var center = handle.start.MultiplyPoint3x4(Vector3.zero);
         var held = Array.FindAll(Numbers(positions.Length), i => (positions[i] - center).magnitude < handle.radius);
         handle.sent = default(Motion);
-        handle.holds = held.Length > 0;
-        if (!handle.holds) Debug.LogWarning("No vertex is within the radius of the handle " + handle.name, this);
-        else session.Handles.Set(handle.name, held);
+        if (held.Length == 0)
+        {
+            Debug.LogWarning("No vertex is within the radius of the handle " + handle.name, this);
+            return;
+        }
+        try
+        {
+            session.Handles.Set(handle.name, held);
+            handle.holds = true;
+        }
+        catch (LpdeformException error)
+        {
+            Warn(error);
+        }
     }
 
     /// Once per picture. Nothing here waits for the network.

@@ -343,15 +343,21 @@ export class Session implements AsyncIterable<Frame> {
   }
 
   /**
-   * The session as a file: mesh, handles, settings, steps to undo and the present surface, but not the writer. The session goes
-   * on meanwhile. For restoreSession(), on any server of the same or a later version.
+   * The session as a file: mesh, handles, settings with every earlier change, steps to undo and the present surface, but not the
+   * writer. The session goes on meanwhile. For restoreSession(), on any server of the same or a later version.
    */
   async snapshot(options: { signal?: AbortSignal } = {}): Promise<Uint8Array<ArrayBuffer>> {
     checkCallOptions(options, "signal");
-    const { isClosed, rpc, lease, stop } = this.#link;
-    if (isClosed) throw sessionClosed();
-    const signal = AbortSignal.any([stop.signal, options.signal].filter((one) => one !== undefined));
-    return takeSnapshot(rpc, lease.session, signal);
+    const link = this.#link;
+    if (link.isClosed) throw sessionClosed();
+    const signal = AbortSignal.any([link.stop.signal, options.signal].filter((one) => one !== undefined));
+    const release = await link.holds.updates(signal);
+    try {
+      await link.sendWaiting(signal);
+    } finally {
+      release();
+    }
+    return takeSnapshot(link.rpc, link.lease.session, signal);
   }
 
   /**

@@ -30,6 +30,25 @@ describe("updates", () => {
     expect([shown!.show, shown!.effort, none!.effort]).toEqual([true, undefined, 0]);
   });
 
+  test.each([3, 30_000])("come before a snapshot that is taken after them, with %d vertices", async (count) => {
+    const server = new FakeServer();
+    const mesh = { vertices: Float32Array.from({ length: 3 * count }, (_, k) => k), faces: [0, 1, 2] };
+    const session = await openWith(server.rpc(), mesh, {});
+    const order: string[] = [];
+    server.on.update = ({ update }) => void order.push(`update ${update!.inputSeq}`);
+    server.on.snapshot = async function* () {
+      order.push("snapshot");
+      yield { offset: 0n, sizeBytes: 1n, data: new Uint8Array(1) };
+    };
+    session.setHandle("tip", { vertices: [1] });
+    session.move("tip", at(1));
+    await session.snapshot();
+    session.move("tip", at(2));
+    await server.until(() => order.length === 4);
+    expect(order).toEqual(["update 1", "update 2", "snapshot", "update 3"]);
+    await session.close();
+  });
+
   test("made faster than they are taken are merged into one", async () => {
     const { server, session } = await begin();
     let answer = () => {};
