@@ -4,7 +4,7 @@ import { parseMesh } from "lpdeform-client/mesh/read";
 import { strToU8, unzipSync, zipSync } from "three/addons/libs/fflate.module.js";
 import { expect, it } from "vitest";
 import { glbIn } from "../src/io/foreign_glb.js";
-import { make3mf, makeBinaryTube, makeDae, makeFbx } from "./made_foreign.js";
+import { make3mf, makeBinaryTube, makeDae, makeFbx, makeLayer } from "./made_foreign.js";
 
 // Files as broken exporters and downloads leave them: each refusal names the element as the file counts it, and nothing that is wrong
 // is opened.
@@ -196,6 +196,28 @@ it("a layer without what it needs is named", async () => {
   await expectRefused("a.fbx", layer("LayerElementNormal", ""), `${wrong}LayerElementNormal without Normals.`);
   const none = '\t\t\tMappingInformationType: "NoMappingInformation"\n';
   expect((await converted("a.fbx", layer("LayerElementMaterial", none))).left).toEqual([]);
+});
+
+it("the ways of a layer that the reader does not know are its own", async () => {
+  const uv = Array.from({ length: 408 }, (_, k) => k / 408);
+  type Layer = Parameters<typeof makeLayer>;
+  const layer = ([name, mapping, reference, part, numbers]: Layer) => `\t\t${name}: 0 {
+\t\t\tMappingInformationType: "${mapping}"
+\t\t\tReferenceInformationType: "${reference}"
+\t\t\t${part}: *${numbers.length} {
+\t\t\t\ta: ${numbers.join(",")}
+\t\t\t}
+\t\t}
+`;
+  for (const name of ["PolygonGroup", "Smoothing", "Texture"]) {
+    const layers: Layer[] = [
+      ["LayerElementUV", "ByVertice", "Direct", "UV", uv],
+      [`LayerElement${name}`, "ByPolygon", "IndexToDirect", name, [0]],
+    ];
+    await converted("a.fbx", objects(layers.map(layer).join("")));
+    const made = layers.map((one) => makeLayer(...one));
+    await converted("a.fbx", makeBinaryTube(7400, undefined, made));
+  }
 });
 
 it("normals that are no numbers are left out, and the page says so", async () => {
