@@ -57,6 +57,8 @@ it.each<[string, Content, number]>([
   ["a.dae", faces(`<polylist count="2">${vertexInput}<vcount>3 4</vcount><p>0 1 13 1 2 14 13</p></polylist>`), 3],
   ["a.dae", faces(`<polygons count="1">${vertexInput}<p>0 1 13 12</p></polygons>`), 2],
   ["a.dae", `<!-- <a> > -->${but(dae, /^.*\n/, "").replace("<mesh>", "<mesh><![CDATA[<b>]]>")}`, 384],
+  ["a.dae", but(dae, 'id="node"', 'id="tube"'), 384],
+  ["a.dae", but(dae, 'id="node"', 'id="red-fx"'), 384],
   ["a.3mf", model("<object", group), 384],
 ])("%s is opened whole (%#)", async (name, content, faceCount) => {
   const { glb } = await converted(name, content);

@@ -15,12 +15,12 @@ const numberCounts: Readonly<Record<string, number>> = {
   rotate: 4,
 };
 /** Elements that name another one by their attribute “url”, and what it is. */
-const instances: Readonly<Record<string, readonly string[]>> = {
-  instance_visual_scene: ["visual_scene"],
-  instance_node: ["node"],
-  instance_geometry: ["geometry"],
-  instance_controller: ["controller"],
-  instance_effect: ["effect"],
+const instances: Readonly<Record<string, string>> = {
+  instance_visual_scene: "visual_scene",
+  instance_node: "node",
+  instance_geometry: "geometry",
+  instance_controller: "controller",
+  instance_effect: "effect",
 };
 
 /** Throws a FileFault. */
@@ -30,10 +30,14 @@ export function checkDae(name: string, text: string): void {
   if (root.name !== "COLLADA") throw xml.fault(root.at, `the file begins with <${root.name}>, and COLLADA with <COLLADA>`);
   for (const needed of ["asset", "scene"]) if (!child(root, needed)) throw xml.fault(root.at, `<COLLADA> has no <${needed}>`);
   const all = [...elementsIn(root)];
-  const byId = new Map(all.flatMap((element) => (element.attributes["id"] ? [[element.attributes["id"], element]] : [])));
+  const named = new Map<string, Element>();
+  for (const element of all) {
+    const { id } = element.attributes;
+    if (id) named.set(`#${id}`, element).set(`${element.name}#${id}`, element);
+  }
   for (const element of all) {
     checkNumbers(xml, element);
-    checkReference(xml, element, byId);
+    checkReference(xml, element, named);
     if (element.name === "geometry") checkGeometry(xml, element);
   }
 }
@@ -60,15 +64,13 @@ function checkNumbers(xml: XmlText, element: Element): void {
   }
 }
 
-function checkReference(xml: XmlText, { name, attributes, at }: Element, byId: ReadonlyMap<string, Element>): void {
-  const kinds = Object.hasOwn(instances, name) ? instances[name]! : undefined;
-  const isSkin = name === "skin" || name === "input";
-  if (!kinds && !isSkin) return;
-  const address = attributes[kinds ? "url" : "source"] ?? "";
-  const target = address.startsWith("#") ? byId.get(address.slice(1)) : undefined;
-  if (!target || (kinds && !kinds.includes(target.name))) {
-    throw xml.fault(at, `<${name}> names “${address}”, which is no ${kinds ? `<${kinds[0]}>` : "element"} of the file`);
-  }
+/** `named`: elements by “#” and their id, and by their name, “#” and their id; those of different names may share an id. */
+function checkReference(xml: XmlText, { name, attributes, at }: Element, named: ReadonlyMap<string, Element>): void {
+  const kind = Object.hasOwn(instances, name) ? instances[name]! : undefined;
+  if (!kind && name !== "skin" && name !== "input") return;
+  const address = attributes[kind ? "url" : "source"] ?? "";
+  const target = address.startsWith("#") ? named.get(`${kind ?? ""}${address}`) : undefined;
+  if (!target) throw xml.fault(at, `<${name}> names “${address}”, which is no ${kind ? `<${kind}>` : "element"} of the file`);
   if (name === "instance_geometry" && !child(target, "mesh")) {
     const kind = target.children[0] ? `a <${target.children[0].name}>` : "nothing";
     throw xml.fault(target.at, `the geometry “${idOf(target)}” has ${kind} in place of a <mesh>`);
