@@ -36,6 +36,12 @@ function parts(change: (all: Record<string, Uint8Array>) => void): Uint8Array {
 
 const faces = (element: string) => but(dae, /<triangles[^]*<\/triangles>/, element);
 const vertexInput = '<input semantic="VERTEX" source="#vertices" offset="0"/>';
+const extra = '<extra><technique profile="a"><scale>1</scale><input type="bool">1</input><skin>a</skin></technique></extra>';
+const physics = `<library_geometries><geometry id="hull"><convex_mesh convex_hull_of="#tube"/></geometry></library_geometries>
+<library_physics_models><physics_model id="body"><rigid_body sid="a"><technique_common><shape>
+  <instance_geometry url="#hull"/><translate>0</translate>
+</shape></technique_common></rigid_body></physics_model></library_physics_models>
+<library_physics_scenes><physics_scene id="world"><instance_node url="#away"/></physics_scene></library_physics_scenes>`;
 const placesOf = (file: string) => /<float_array[^>]*>([^<]*)/.exec(file)![1]!;
 const group = '<basematerials id="5"><base name="a" displaycolor="#ff0000"/></basematerials><object';
 
@@ -59,6 +65,8 @@ it.each<[string, Content, number]>([
   ["a.dae", `<!-- <a> > -->${but(dae, /^.*\n/, "").replace("<mesh>", "<mesh><![CDATA[<b>]]>")}`, 384],
   ["a.dae", but(dae, 'id="node"', 'id="tube"'), 384],
   ["a.dae", but(dae, 'id="node"', 'id="red-fx"'), 384],
+  ["a.dae", but(dae, "</node>", `${extra}</node>`), 384],
+  ["a.dae", but(dae, "<library_visual_scenes>", `${physics}<library_visual_scenes>`), 384],
   ["a.3mf", model("<object", group), 384],
 ])("%s is opened whole (%#)", async (name, content, faceCount) => {
   const { glb } = await converted(name, content);

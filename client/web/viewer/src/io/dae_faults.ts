@@ -23,13 +23,16 @@ const instances: Readonly<Record<string, string>> = {
   instance_effect: "effect",
 };
 
+/** What has no part in the shapes that are shown: what other programs want, and physics. */
+const passedOver = ["extra", "library_physics_models", "library_physics_scenes"];
+
 /** Throws a FileFault. */
 export function checkDae(name: string, text: string): void {
   const xml = new XmlText(name, text);
   const root = xml.root();
   if (root.name !== "COLLADA") throw xml.fault(root.at, `the file begins with <${root.name}>, and COLLADA with <COLLADA>`);
   for (const needed of ["asset", "scene"]) if (!child(root, needed)) throw xml.fault(root.at, `<COLLADA> has no <${needed}>`);
-  const all = [...elementsIn(root)];
+  const all = [...elementsIn(root, passedOver)];
   const named = new Map<string, Element>();
   for (const element of all) {
     const { id } = element.attributes;

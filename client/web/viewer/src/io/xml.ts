@@ -114,10 +114,11 @@ function attributesIn(text: string): Record<string, string> {
   return found;
 }
 
-/** An element and all that stand in it. */
-export function* elementsIn(element: Element): Generator<Element> {
+/** An element and all that stand in it, but for those of the names `without` and what stands in them. */
+export function* elementsIn(element: Element, without: readonly string[]): Generator<Element> {
+  if (without.includes(element.name)) return;
   yield element;
-  for (const child of element.children) yield* elementsIn(child);
+  for (const child of element.children) yield* elementsIn(child, without);
 }
 
 export const wordsOf = (text: string): string[] =>
