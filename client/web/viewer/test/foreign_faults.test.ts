@@ -67,6 +67,10 @@ it.each<[string, Content, number]>([
   ["a.dae", but(dae, 'id="node"', 'id="red-fx"'), 384],
   ["a.dae", but(dae, "</node>", `${extra}</node>`), 384],
   ["a.dae", but(dae, "<library_visual_scenes>", `${physics}<library_visual_scenes>`), 384],
+  ["a.dae", but(dae, /<p>(.*)<\/p>/, "<p><![CDATA[$1]]></p>"), 384],
+  ["a.dae", but(dae, /<p>(.*) (.*)<\/p>/, "<p><?a b?>$1<?a b?> <!-- 7 -->&#13;&#xD;\n<![CDATA[$2]]></p>"), 384],
+  ["a.dae", but(dae, '"VERTEX" source="#vertices"', '"&#86;ERTEX" source="&#x23;vertices"'), 384],
+  ["a.dae", but(dae, 'id="tube"', 'id="a&#x62;&amp;c"').replace("#tube", "#ab&#38;c"), 384],
   ["a.3mf", model("<object", group), 384],
 ])("%s is opened whole (%#)", async (name, content, faceCount) => {
   const { glb } = await converted(name, content);
@@ -87,6 +91,8 @@ it.each<[Content, string]>([
   [but(dae, "<p>0 1 13", "<p>0 1 999"), ", line 18: <triangles> of the geometry “tube” has a polygon 0 with vertex 999;"],
   [but(dae, "<p>0 1 13", "<p>0 x 13"), ", line 18: <p> has “x”, which is no whole number from 0."],
   [but(dae, "<p>0 1 13", "<p>0 -1 13"), ", line 18: <p> has “-1”, which is no whole number from 0."],
+  [but(dae, "<p>0 1 13", "<p>0 &#x110000; 13"), ", line 18: <p> has “&#x110000;”, which is no whole number from 0."],
+  [but(dae, "<p>0 1 13", "<p>0 1&own;13"), ", line 18: <p> has “1&own;13”, which is no whole number from 0."],
   [but(dae, "<p>0 1 13", "<p>0 1.5 13"), ", line 18: <p> has “1.5”, which is no whole number from 0."],
   [
     but(dae, "<p>0 1 13 ", "<p>0 1 "),
