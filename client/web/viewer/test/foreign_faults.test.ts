@@ -143,6 +143,12 @@ it.each<[Content, string]>([
   await expectRefused("a.dae", content, words);
 });
 
+it("the time to refuse a long tag grows no faster than the tag", async () => {
+  const long = "a".repeat(200_000);
+  await expectRefused("a.dae", `<${long}<`, " ends too soon: the tag of line 1 has no end.");
+  await expectRefused("a.dae", `<COLLADA ${long}/>`, ", line 1: <COLLADA> has no <asset>.");
+});
+
 const objects = (piece: string) => but(fbx, "\t\tGeometryVersion: 124\n", `\t\tGeometryVersion: 124\n${piece}`);
 
 it.each<[Content, string]>([

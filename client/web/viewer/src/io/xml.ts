@@ -19,8 +19,8 @@ export interface Element extends Tag {
   text: string;
 }
 
-const tag = /<(\/?)([^\s/>!?<]+)((?:[^"'<>]|"[^"<]*"|'[^'<]*')*)>/y;
-const attribute = /([^\s=]+)\s*=\s*(?:"([^"]*)"|'([^']*)')/g;
+const tag = /<(\/?)([^\s/>!?<]+)(?=[\s/>])((?:[^"'<>]|"[^"<]*"|'[^'<]*')*)>/y;
+const attribute = /(?<=^|[\s"'])([^\s="']+)\s*=\s*(?:"([^"]*)"|'([^']*)')/g;
 /** What is no element, by its beginning, and its end. */
 const others = [
   ["<!--", "-->"],
