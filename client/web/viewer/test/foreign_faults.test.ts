@@ -12,6 +12,7 @@ import { make3mf, makeBinaryTube, makeDae, makeFbx, makeLayer } from "./made_for
 type Content = string | Uint8Array;
 
 const [dae, fbx, tube, binary] = [makeDae(), makeFbx(), make3mf(), makeBinaryTube(7400)];
+const unlinked = Buffer.from(binary.toString("latin1").replaceAll("\x02\0\0\0OO", "\x02\0\0\0OP"), "latin1");
 const [corners] = [204]; // of the tube
 
 /** The file with another piece, which must stand in it. */
@@ -193,7 +194,8 @@ it.each<[Content, string]>([
   [makeBinaryTube(6100), ": FBX version not supported, FileVersion: 6100."],
   [binary.map((byte) => byte || 32), ": byte 20 is 32 in place of 0; the file was changed as if it were text."],
   [binary.subarray(0, 1500), " ends too soon, in or after its node “PolygonVertexIndex” at byte 813: it has 1500"],
-  [binary.subarray(0, binary.length - 310), ": the geometry 1001 “tube” belongs to no model: the connections name none."],
+  [binary.subarray(0, binary.length - 310), " ends too soon, in or after its node “C” at byte"],
+  [unlinked, ": the geometry 1001 “tube” belongs to no model: the connections name none."],
 ])("a broken FBX file is refused by its geometry (%#)", async (content, words) => {
   await expectRefused("a.fbx", content, words);
 });
@@ -208,6 +210,12 @@ it("a broken FBX file in binary is refused by its geometry and polygon", async (
   const damaged = Uint8Array.from(binary);
   damaged.fill(255, 300, 330);
   await expectRefused("a.fbx", damaged, "a.fbx: the Vertices of the geometry 1001 “tube” at byte");
+});
+
+it("a binary FBX file is opened whole however long its foot is", async () => {
+  for (const whole of [binary, makeBinaryTube(7500)]) {
+    for (let cut = 0; cut <= 300; cut += 5) await converted("a.fbx", whole.subarray(0, whole.length - cut));
+  }
 });
 
 it("a layer without what it needs is named", async () => {

@@ -156,6 +156,7 @@ export function makeBinaryTube(version: number, { points, triangles } = small, l
     name: "C",
     properties: [textProperty("OO"), idProperty(part), idProperty(owner)],
   });
+  const more = Array.from({ length: 8 }, (_, k) => link(2000 + k, 0)); // of what is not there, so that the links are longer than a foot
   return makeBinary(version, [
     { name: "GlobalSettings", children: [{ name: "Version", properties: [idProperty(1000)] }] },
     {
@@ -173,7 +174,7 @@ export function makeBinaryTube(version: number, { points, triangles } = small, l
         { name: "Model", properties: [idProperty(1002), called("pipe"), textProperty("Mesh")] },
       ],
     },
-    { name: "Connections", children: [link(1002, 0), link(1001, 1002)] },
+    { name: "Connections", children: [...more, link(1002, 0), link(1001, 1002)] },
   ]);
 }
 
