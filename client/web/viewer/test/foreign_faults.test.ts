@@ -144,6 +144,28 @@ it.each<[Content, string]>([
   await expectRefused("a.dae", content, words);
 });
 
+it("copies that double at each level are refused", async () => {
+  const levels = (count: number, level: (k: number) => string) => Array.from({ length: count }, (_, k) => level(k + 1)).join("\n");
+  const nodes = (count: number) => {
+    const twice = (k: number) => `<instance_node url="#n${k}"/><instance_node url="#n${k}"/>`;
+    const made = levels(count, (k) => `<node id="n${k}">${twice(k - 1)}</node>`);
+    const library = `<library_nodes><node id="n0"/>\n${made}</library_nodes>`;
+    const all = but(dae, "<library_visual_scenes>", `${library}<library_visual_scenes>`);
+    return but(all, "</bind_material></instance_geometry>", `$&<instance_node url="#n${count}"/>`);
+  };
+  await converted("a.dae", nodes(8));
+  const end = "and all its parts, more than 100000 copies are made; that is the limit for a file.";
+  await expectRefused("a.dae", nodes(60), `a.dae, line 35: with the node “n14” ${end}`);
+  await expectRefused("a.dae", but(dae, "<translate>0", '<instance_node url="#node"/>$&'), ": the node “node” is a part of itself.");
+  const objects = (count: number) => {
+    const twice = (k: number) => `<component objectid="${k}"/><component objectid="${k}"/>`;
+    const made = levels(count, (k) => `<object id="${k + 1}"><components>${twice(k)}</components></object>`);
+    return model("</resources>", `\n${made}</resources>`);
+  };
+  await converted("a.3mf", objects(8));
+  await expectRefused("a.3mf", objects(60), `a.3mf, 3D/model.model, line 21: with the object “15” ${end}`);
+});
+
 it("the time to refuse a long tag grows no faster than the tag", async () => {
   const long = "a".repeat(200_000);
   await expectRefused("a.dae", `<${long}<`, " ends too soon: the tag of line 1 has no end.");
@@ -324,7 +346,7 @@ it.each<[Content, string]>([
   ],
   [
     model("</resources>", '<object id="2"><components><component objectid="2"/></components></object></resources>'),
-    ", 3D/model.model, line 6: the object “2” is a component of itself.",
+    ", 3D/model.model, line 6: the object “2” is a part of itself.",
   ],
   [
     model("</resources>", '<object id="1"><mesh/></object></resources>'),

@@ -1,4 +1,5 @@
 import type { FileFault } from "lpdeform-client/mesh/fault";
+import { checkCopies, type Use } from "./uses.js";
 import { type Element, elementsIn, isNumber, wordsOf, XmlText } from "./xml.js";
 
 // What a COLLADA file has that the reader of three.js would leave out or tear without a word is refused by its line. Everything counts
@@ -43,6 +44,21 @@ export function checkDae(name: string, text: string): void {
     checkReference(xml, element, named);
     if (element.name === "geometry") checkGeometry(xml, element);
   }
+  const uses = all.flatMap((element) => (element.name === "node" ? usesIn(xml, element) : []));
+  const copies = uses.filter(({ name }) => name === "instance_node");
+  checkCopies("node", uses, copies);
+}
+
+/** What a node has in it. A node without an id is called by its place. */
+function usesIn(xml: XmlText, node: Element): Use[] {
+  const keyOf = ({ attributes, at }: Element) => attributes["id"] ?? `at ${at}`;
+  return node.children.flatMap((part) => {
+    const { name, attributes, at } = part;
+    if (name !== "node" && !/^instance_(node|geometry|controller)$/.test(name)) return [];
+    const address = attributes["url"] ?? "";
+    const object = name === "node" ? keyOf(part) : name === "instance_node" ? address.slice(1) : address;
+    return [{ xml, at, name, object, by: keyOf(node) }];
+  });
 }
 
 const child = (element: Element, name: string): Element | undefined => element.children.find((one) => one.name === name);
