@@ -352,6 +352,7 @@ it.each<[Content, string]>([
     model("</resources>", '<object id="1"><mesh/></object></resources>'),
     ", line 6: the object “1” is in the file twice, the other",
   ],
+  [model("</mesh>", '</mesh>\n<object id="2"><mesh/></object>'), ", line 7: the object “2” stands in the object “1” of line 3."],
   [model('name="pipe"', 'name="pipe" pid="9"'), ", line 3: the object “1” names the group “9”, which is no <basematerials>"],
   [
     model("<object", group.replace("<object", '<object pid="5" pindex="7"')),

@@ -132,6 +132,10 @@ class Model {
 
   #beginObject({ attributes, at }: Tag): void {
     const { id = "", pid, pindex } = attributes;
+    const outer = this.#object;
+    if (outer) {
+      throw this.xml.fault(at, `the object “${id}” stands in the object “${outer.id}” of line ${this.xml.lineOf(outer.at)}`);
+    }
     const other = this.objects.get(id);
     if (other !== undefined) throw this.xml.fault(at, `the object “${id}” is in the file twice, the other time in ${other}`);
     this.objects.set(id, this.part);
