@@ -145,7 +145,8 @@ it.each<[Content, string]>([
 });
 
 it("copies that double at each level are refused", async () => {
-  const levels = (count: number, level: (k: number) => string) => Array.from({ length: count }, (_, k) => level(k + 1)).join("\n");
+  const levels = (count: number, level: (k: number) => string) =>
+    Array.from({ length: count }, (_, k) => level(k + 1)).join("\n");
   const nodes = (count: number) => {
     const twice = (k: number) => `<instance_node url="#n${k}"/><instance_node url="#n${k}"/>`;
     const made = levels(count, (k) => `<node id="n${k}">${twice(k - 1)}</node>`);
@@ -156,7 +157,11 @@ it("copies that double at each level are refused", async () => {
   await converted("a.dae", nodes(8));
   const end = "and all its parts, more than 100000 copies are made; that is the limit for a file.";
   await expectRefused("a.dae", nodes(60), `a.dae, line 35: with the node “n14” ${end}`);
-  await expectRefused("a.dae", but(dae, "<translate>0", '<instance_node url="#node"/>$&'), ": the node “node” is a part of itself.");
+  await expectRefused(
+    "a.dae",
+    but(dae, "<translate>0", '<instance_node url="#node"/>$&'),
+    ": the node “node” is a part of itself.",
+  );
   const objects = (count: number) => {
     const twice = (k: number) => `<component objectid="${k}"/><component objectid="${k}"/>`;
     const made = levels(count, (k) => `<object id="${k + 1}"><components>${twice(k)}</components></object>`);
@@ -352,7 +357,10 @@ it.each<[Content, string]>([
     model("</resources>", '<object id="1"><mesh/></object></resources>'),
     ", line 6: the object “1” is in the file twice, the other",
   ],
-  [model("</mesh>", '</mesh>\n<object id="2"><mesh/></object>'), ", line 7: the object “2” stands in the object “1” of line 3."],
+  [
+    model("</mesh>", '</mesh>\n<object id="2"><mesh/></object>'),
+    ", line 7: the object “2” stands in the object “1” of line 3.",
+  ],
   [model('name="pipe"', 'name="pipe" pid="9"'), ", line 3: the object “1” names the group “9”, which is no <basematerials>"],
   [
     model("<object", group.replace("<object", '<object pid="5" pindex="7"')),
