@@ -4,7 +4,7 @@ import { parseMesh } from "lpdeform-client/mesh/read";
 import { strToU8, unzipSync, zipSync } from "three/addons/libs/fflate.module.js";
 import { expect, it } from "vitest";
 import { glbIn } from "../src/io/foreign_glb.js";
-import { make3mf, makeBinaryTube, makeDae, makeFbx } from "./made_foreign.js";
+import { make3mf, makeBinaryTube, makeDae, makeFbx, makeLayer } from "./made_foreign.js";
 
 // Files as broken exporters and downloads leave them: each refusal names the element as the file counts it, and nothing that is wrong
 // is opened.
@@ -12,6 +12,7 @@ import { make3mf, makeBinaryTube, makeDae, makeFbx } from "./made_foreign.js";
 type Content = string | Uint8Array;
 
 const [dae, fbx, tube, binary] = [makeDae(), makeFbx(), make3mf(), makeBinaryTube(7400)];
+const unlinked = Buffer.from(binary.toString("latin1").replaceAll("\x02\0\0\0OO", "\x02\0\0\0OP"), "latin1");
 const [corners] = [204]; // of the tube
 
 /** The file with another piece, which must stand in it. */
@@ -36,6 +37,12 @@ function parts(change: (all: Record<string, Uint8Array>) => void): Uint8Array {
 
 const faces = (element: string) => but(dae, /<triangles[^]*<\/triangles>/, element);
 const vertexInput = '<input semantic="VERTEX" source="#vertices" offset="0"/>';
+const extra = '<extra><technique profile="a"><scale>1</scale><input type="bool">1</input><skin>a</skin></technique></extra>';
+const physics = `<library_geometries><geometry id="hull"><convex_mesh convex_hull_of="#tube"/></geometry></library_geometries>
+<library_physics_models><physics_model id="body"><rigid_body sid="a"><technique_common><shape>
+  <instance_geometry url="#hull"/><translate>0</translate>
+</shape></technique_common></rigid_body></physics_model></library_physics_models>
+<library_physics_scenes><physics_scene id="world"><instance_node url="#away"/></physics_scene></library_physics_scenes>`;
 const placesOf = (file: string) => /<float_array[^>]*>([^<]*)/.exec(file)![1]!;
 const group = '<basematerials id="5"><base name="a" displaycolor="#ff0000"/></basematerials><object';
 
@@ -57,6 +64,14 @@ it.each<[string, Content, number]>([
   ["a.dae", faces(`<polylist count="2">${vertexInput}<vcount>3 4</vcount><p>0 1 13 1 2 14 13</p></polylist>`), 3],
   ["a.dae", faces(`<polygons count="1">${vertexInput}<p>0 1 13 12</p></polygons>`), 2],
   ["a.dae", `<!-- <a> > -->${but(dae, /^.*\n/, "").replace("<mesh>", "<mesh><![CDATA[<b>]]>")}`, 384],
+  ["a.dae", but(dae, 'id="node"', 'id="tube"'), 384],
+  ["a.dae", but(dae, 'id="node"', 'id="red-fx"'), 384],
+  ["a.dae", but(dae, "</node>", `${extra}</node>`), 384],
+  ["a.dae", but(dae, "<library_visual_scenes>", `${physics}<library_visual_scenes>`), 384],
+  ["a.dae", but(dae, /<p>(.*)<\/p>/, "<p><![CDATA[$1]]></p>"), 384],
+  ["a.dae", but(dae, /<p>(.*) (.*)<\/p>/, "<p><?a b?>$1<?a b?> <!-- 7 -->&#13;&#xD;\n<![CDATA[$2]]></p>"), 384],
+  ["a.dae", but(dae, '"VERTEX" source="#vertices"', '"&#86;ERTEX" source="&#x23;vertices"'), 384],
+  ["a.dae", but(dae, 'id="tube"', 'id="a&#x62;&amp;c"').replace("#tube", "#ab&#38;c"), 384],
   ["a.3mf", model("<object", group), 384],
 ])("%s is opened whole (%#)", async (name, content, faceCount) => {
   const { glb } = await converted(name, content);
@@ -77,6 +92,8 @@ it.each<[Content, string]>([
   [but(dae, "<p>0 1 13", "<p>0 1 999"), ", line 18: <triangles> of the geometry “tube” has a polygon 0 with vertex 999;"],
   [but(dae, "<p>0 1 13", "<p>0 x 13"), ", line 18: <p> has “x”, which is no whole number from 0."],
   [but(dae, "<p>0 1 13", "<p>0 -1 13"), ", line 18: <p> has “-1”, which is no whole number from 0."],
+  [but(dae, "<p>0 1 13", "<p>0 &#x110000; 13"), ", line 18: <p> has “&#x110000;”, which is no whole number from 0."],
+  [but(dae, "<p>0 1 13", "<p>0 1&own;13"), ", line 18: <p> has “1&own;13”, which is no whole number from 0."],
   [but(dae, "<p>0 1 13", "<p>0 1.5 13"), ", line 18: <p> has “1.5”, which is no whole number from 0."],
   [
     but(dae, "<p>0 1 13 ", "<p>0 1 "),
@@ -127,6 +144,39 @@ it.each<[Content, string]>([
   await expectRefused("a.dae", content, words);
 });
 
+it("copies that double at each level are refused", async () => {
+  const levels = (count: number, level: (k: number) => string) =>
+    Array.from({ length: count }, (_, k) => level(k + 1)).join("\n");
+  const nodes = (count: number) => {
+    const twice = (k: number) => `<instance_node url="#n${k}"/><instance_node url="#n${k}"/>`;
+    const made = levels(count, (k) => `<node id="n${k}">${twice(k - 1)}</node>`);
+    const library = `<library_nodes><node id="n0"/>\n${made}</library_nodes>`;
+    const all = but(dae, "<library_visual_scenes>", `${library}<library_visual_scenes>`);
+    return but(all, "</bind_material></instance_geometry>", `$&<instance_node url="#n${count}"/>`);
+  };
+  await converted("a.dae", nodes(8));
+  const end = "and all its parts, more than 100000 copies are made; that is the limit for a file.";
+  await expectRefused("a.dae", nodes(60), `a.dae, line 35: with the node “n14” ${end}`);
+  await expectRefused(
+    "a.dae",
+    but(dae, "<translate>0", '<instance_node url="#node"/>$&'),
+    ": the node “node” is a part of itself.",
+  );
+  const objects = (count: number) => {
+    const twice = (k: number) => `<component objectid="${k}"/><component objectid="${k}"/>`;
+    const made = levels(count, (k) => `<object id="${k + 1}"><components>${twice(k)}</components></object>`);
+    return model("</resources>", `\n${made}</resources>`);
+  };
+  await converted("a.3mf", objects(8));
+  await expectRefused("a.3mf", objects(60), `a.3mf, 3D/model.model, line 21: with the object “15” ${end}`);
+});
+
+it("the time to refuse a long tag grows no faster than the tag", async () => {
+  const long = "a".repeat(200_000);
+  await expectRefused("a.dae", `<${long}<`, " ends too soon: the tag of line 1 has no end.");
+  await expectRefused("a.dae", `<COLLADA ${long}/>`, ", line 1: <COLLADA> has no <asset>.");
+});
+
 const objects = (piece: string) => but(fbx, "\t\tGeometryVersion: 124\n", `\t\tGeometryVersion: 124\n${piece}`);
 
 it.each<[Content, string]>([
@@ -171,7 +221,8 @@ it.each<[Content, string]>([
   [makeBinaryTube(6100), ": FBX version not supported, FileVersion: 6100."],
   [binary.map((byte) => byte || 32), ": byte 20 is 32 in place of 0; the file was changed as if it were text."],
   [binary.subarray(0, 1500), " ends too soon, in or after its node “PolygonVertexIndex” at byte 813: it has 1500"],
-  [binary.subarray(0, binary.length - 310), ": the geometry 1001 “tube” belongs to no model: the connections name none."],
+  [binary.subarray(0, binary.length - 310), " ends too soon, in or after its node “C” at byte"],
+  [unlinked, ": the geometry 1001 “tube” belongs to no model: the connections name none."],
 ])("a broken FBX file is refused by its geometry (%#)", async (content, words) => {
   await expectRefused("a.fbx", content, words);
 });
@@ -188,6 +239,12 @@ it("a broken FBX file in binary is refused by its geometry and polygon", async (
   await expectRefused("a.fbx", damaged, "a.fbx: the Vertices of the geometry 1001 “tube” at byte");
 });
 
+it("a binary FBX file is opened whole however long its foot is", async () => {
+  for (const whole of [binary, makeBinaryTube(7500)]) {
+    for (let cut = 0; cut <= 300; cut += 5) await converted("a.fbx", whole.subarray(0, whole.length - cut));
+  }
+});
+
 it("a layer without what it needs is named", async () => {
   const layer = (name: string, lines: string) => objects(`\t\t${name}: 0 {\n${lines}\t\t}\n`);
   const indexed = '\t\t\tReferenceInformationType: "IndexToDirect"\n\t\t\tColors: *4 {\n\t\t\t\ta: 1,1,1,1\n\t\t\t}\n';
@@ -196,6 +253,28 @@ it("a layer without what it needs is named", async () => {
   await expectRefused("a.fbx", layer("LayerElementNormal", ""), `${wrong}LayerElementNormal without Normals.`);
   const none = '\t\t\tMappingInformationType: "NoMappingInformation"\n';
   expect((await converted("a.fbx", layer("LayerElementMaterial", none))).left).toEqual([]);
+});
+
+it("the ways of a layer that the reader does not know are its own", async () => {
+  const uv = Array.from({ length: 408 }, (_, k) => k / 408);
+  type Layer = Parameters<typeof makeLayer>;
+  const layer = ([name, mapping, reference, part, numbers]: Layer) => `\t\t${name}: 0 {
+\t\t\tMappingInformationType: "${mapping}"
+\t\t\tReferenceInformationType: "${reference}"
+\t\t\t${part}: *${numbers.length} {
+\t\t\t\ta: ${numbers.join(",")}
+\t\t\t}
+\t\t}
+`;
+  for (const name of ["PolygonGroup", "Smoothing", "Texture"]) {
+    const layers: Layer[] = [
+      ["LayerElementUV", "ByVertice", "Direct", "UV", uv],
+      [`LayerElement${name}`, "ByPolygon", "IndexToDirect", name, [0]],
+    ];
+    await converted("a.fbx", objects(layers.map(layer).join("")));
+    const made = layers.map((one) => makeLayer(...one));
+    await converted("a.fbx", makeBinaryTube(7400, undefined, made));
+  }
 });
 
 it("normals that are no numbers are left out, and the page says so", async () => {
@@ -272,11 +351,15 @@ it.each<[Content, string]>([
   ],
   [
     model("</resources>", '<object id="2"><components><component objectid="2"/></components></object></resources>'),
-    ", 3D/model.model, line 6: the object “2” is a component of itself.",
+    ", 3D/model.model, line 6: the object “2” is a part of itself.",
   ],
   [
     model("</resources>", '<object id="1"><mesh/></object></resources>'),
     ", line 6: the object “1” is in the file twice, the other",
+  ],
+  [
+    model("</mesh>", '</mesh>\n<object id="2"><mesh/></object>'),
+    ", line 7: the object “2” stands in the object “1” of line 3.",
   ],
   [model('name="pipe"', 'name="pipe" pid="9"'), ", line 3: the object “1” names the group “9”, which is no <basematerials>"],
   [

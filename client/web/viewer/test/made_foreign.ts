@@ -137,8 +137,18 @@ export function makeBinaryFbx(version: number, ...counts: number[]): Buffer {
   return makeBinary(version, [{ name: "Objects", properties: odd }, ...counts.map(truths)]);
 }
 
+/** A layer of a geometry in binary: `part` has numbers. */
+export function makeLayer(name: string, mapping: string, reference: string, part: string, numbers: readonly number[]): Node {
+  const children = [
+    { name: "MappingInformationType", properties: [textProperty(mapping)] },
+    { name: "ReferenceInformationType", properties: [textProperty(reference)] },
+    { name: part, properties: [arrayProperty("d", Float64Array.from(numbers))] },
+  ];
+  return { name, properties: [idProperty(0)], children };
+}
+
 /** A tube as in makeFbx(), in binary. */
-export function makeBinaryTube(version: number, { points, triangles } = small): Buffer {
+export function makeBinaryTube(version: number, { points, triangles } = small, layers: readonly Node[] = []): Buffer {
   const places = Float64Array.from(points.flatMap(([x, y, z]) => [x!, z!, -y!]));
   const corners = Int32Array.from(triangles.flatMap(([a, b, c]) => [a!, b!, -c! - 1]));
   const called = (name: string) => textProperty(`${name}\0\x01Geometry`);
@@ -146,6 +156,7 @@ export function makeBinaryTube(version: number, { points, triangles } = small): 
     name: "C",
     properties: [textProperty("OO"), idProperty(part), idProperty(owner)],
   });
+  const more = Array.from({ length: 8 }, (_, k) => link(2000 + k, 0)); // of what is not there, so that the links are longer than a foot
   return makeBinary(version, [
     { name: "GlobalSettings", children: [{ name: "Version", properties: [idProperty(1000)] }] },
     {
@@ -157,12 +168,13 @@ export function makeBinaryTube(version: number, { points, triangles } = small): 
           children: [
             { name: "Vertices", properties: [arrayProperty("d", places)] },
             { name: "PolygonVertexIndex", properties: [arrayProperty("i", corners)] },
+            ...layers,
           ],
         },
         { name: "Model", properties: [idProperty(1002), called("pipe"), textProperty("Mesh")] },
       ],
     },
-    { name: "Connections", children: [link(1002, 0), link(1001, 1002)] },
+    { name: "Connections", children: [...more, link(1002, 0), link(1001, 1002)] },
   ]);
 }
 

@@ -1,4 +1,5 @@
 import type { FileFault } from "lpdeform-client/mesh/fault";
+import { checkCopies, type Use } from "./uses.js";
 import { type Element, elementsIn, isNumber, wordsOf, XmlText } from "./xml.js";
 
 // What a COLLADA file has that the reader of three.js would leave out or tear without a word is refused by its line. Everything counts
@@ -15,13 +16,16 @@ const numberCounts: Readonly<Record<string, number>> = {
   rotate: 4,
 };
 /** Elements that name another one by their attribute “url”, and what it is. */
-const instances: Readonly<Record<string, readonly string[]>> = {
-  instance_visual_scene: ["visual_scene"],
-  instance_node: ["node"],
-  instance_geometry: ["geometry"],
-  instance_controller: ["controller"],
-  instance_effect: ["effect"],
+const instances: Readonly<Record<string, string>> = {
+  instance_visual_scene: "visual_scene",
+  instance_node: "node",
+  instance_geometry: "geometry",
+  instance_controller: "controller",
+  instance_effect: "effect",
 };
+
+/** What has no part in the shapes that are shown: what other programs want, and physics. */
+const passedOver = ["extra", "library_physics_models", "library_physics_scenes"];
 
 /** Throws a FileFault. */
 export function checkDae(name: string, text: string): void {
@@ -29,13 +33,32 @@ export function checkDae(name: string, text: string): void {
   const root = xml.root();
   if (root.name !== "COLLADA") throw xml.fault(root.at, `the file begins with <${root.name}>, and COLLADA with <COLLADA>`);
   for (const needed of ["asset", "scene"]) if (!child(root, needed)) throw xml.fault(root.at, `<COLLADA> has no <${needed}>`);
-  const all = [...elementsIn(root)];
-  const byId = new Map(all.flatMap((element) => (element.attributes["id"] ? [[element.attributes["id"], element]] : [])));
+  const all = [...elementsIn(root, passedOver)];
+  const named = new Map<string, Element>();
+  for (const element of all) {
+    const { id } = element.attributes;
+    if (id) named.set(`#${id}`, element).set(`${element.name}#${id}`, element);
+  }
   for (const element of all) {
     checkNumbers(xml, element);
-    checkReference(xml, element, byId);
+    checkReference(xml, element, named);
     if (element.name === "geometry") checkGeometry(xml, element);
   }
+  const uses = all.flatMap((element) => (element.name === "node" ? usesIn(xml, element) : []));
+  const copies = uses.filter(({ name }) => name === "instance_node");
+  checkCopies("node", uses, copies);
+}
+
+/** What a node has in it. A node without an id is called by its place. */
+function usesIn(xml: XmlText, node: Element): Use[] {
+  const keyOf = ({ attributes, at }: Element) => attributes["id"] ?? `at ${at}`;
+  return node.children.flatMap((part) => {
+    const { name, attributes, at } = part;
+    if (name !== "node" && !/^instance_(node|geometry|controller)$/.test(name)) return [];
+    const address = attributes["url"] ?? "";
+    const object = name === "node" ? keyOf(part) : name === "instance_node" ? address.slice(1) : address;
+    return [{ xml, at, name, object, by: keyOf(node) }];
+  });
 }
 
 const child = (element: Element, name: string): Element | undefined => element.children.find((one) => one.name === name);
@@ -60,15 +83,13 @@ function checkNumbers(xml: XmlText, element: Element): void {
   }
 }
 
-function checkReference(xml: XmlText, { name, attributes, at }: Element, byId: ReadonlyMap<string, Element>): void {
-  const kinds = Object.hasOwn(instances, name) ? instances[name]! : undefined;
-  const isSkin = name === "skin" || name === "input";
-  if (!kinds && !isSkin) return;
-  const address = attributes[kinds ? "url" : "source"] ?? "";
-  const target = address.startsWith("#") ? byId.get(address.slice(1)) : undefined;
-  if (!target || (kinds && !kinds.includes(target.name))) {
-    throw xml.fault(at, `<${name}> names “${address}”, which is no ${kinds ? `<${kinds[0]}>` : "element"} of the file`);
-  }
+/** `named`: elements by “#” and their id, and by their name, “#” and their id; those of different names may share an id. */
+function checkReference(xml: XmlText, { name, attributes, at }: Element, named: ReadonlyMap<string, Element>): void {
+  const kind = Object.hasOwn(instances, name) ? instances[name]! : undefined;
+  if (!kind && name !== "skin" && name !== "input") return;
+  const address = attributes[kind ? "url" : "source"] ?? "";
+  const target = address.startsWith("#") ? named.get(`${kind ?? ""}${address}`) : undefined;
+  if (!target) throw xml.fault(at, `<${name}> names “${address}”, which is no ${kind ? `<${kind}>` : "element"} of the file`);
   if (name === "instance_geometry" && !child(target, "mesh")) {
     const kind = target.children[0] ? `a <${target.children[0].name}>` : "nothing";
     throw xml.fault(target.at, `the geometry “${idOf(target)}” has ${kind} in place of a <mesh>`);

@@ -41,6 +41,7 @@ const layerParts: Readonly<Record<string, readonly [string, string?]>> = {
   LayerElementColor: ["Colors", "ColorIndex"],
   LayerElementMaterial: ["Materials"],
 };
+const layerName = /^LayerElement\w+$/;
 
 interface Contents {
   geometries: Geometry[];
@@ -116,8 +117,9 @@ function checkPolygons({ where, places, corners }: Geometry, fault: Fault): void
 
 function checkLayers({ layers }: Geometry, fault: Fault): void {
   for (const { where, name, ways, parts } of layers) {
-    const [array, index] = layerParts[name]!;
-    if (ways.has("NoMappingInformation")) continue;
+    const needed = layerParts[name];
+    if (!needed || ways.has("NoMappingInformation")) continue;
+    const [array, index] = needed;
     // The reader passes over colours and places in a texture that are not there.
     const isUnread = !parts.has(array) && index !== undefined;
     const missing = [array, ways.has("IndexToDirect") ? index : undefined].find(
@@ -153,7 +155,7 @@ function binaryContents(file: string, bytes: Uint8Array<ArrayBuffer>): Contents 
         contents.geometries.push({ where: file, id: id(first), name: plainName(text(second)), kind: text(third), layers: [] });
       }
       const layer = geometry?.layers.at(-1);
-      if (Object.hasOwn(layerParts, name)) geometry?.layers.push(layerOf(file, name));
+      if (layerName.test(name)) geometry?.layers.push(layerOf(file, name));
       else layer?.parts.add(name);
       if (/^(Mapping|Reference)InformationType$/.test(name) && layer && first) layer.ways.add(text(first));
       if (geometry && name === "Vertices") geometry.places = numbersOf(file, bytes, node, geometry);
@@ -200,7 +202,7 @@ const heads = new RegExp(
     [
       /(?<kind>Geometry|Model): *(?<id>-?\d+), *"(?<name>[^"]*)", *"(?<type>[^"]*)"/,
       /(?<array>Vertices|PolygonVertexIndex): *\*(?<count>\d+) *\{(?<body>[^}]*)/,
-      /(?<layer>LayerElement(?:Normal|UV|Color|Material)): *\d+ *\{/,
+      /(?<layer>LayerElement\w+): *\d+ *\{/,
       /(?<part>Normals|UV|UVIndex|Colors|ColorIndex|Materials): *\*/,
       /(?<way>(?:Mapping|Reference)InformationType): *"(?<how>\w*)"/,
       /C: *"OO", *(?<from>-?\d+), *(?<to>-?\d+)/,

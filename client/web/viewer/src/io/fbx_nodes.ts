@@ -4,7 +4,7 @@ const widths: Record<string, number> = { C: 1, Y: 2, I: 4, F: 4, D: 8, L: 8 };
 const elementWidths: Record<string, number> = { b: 1, c: 1, i: 4, f: 4, d: 8, l: 8 };
 /** The magic of an FBX file, before its version. */
 const headBytes = 23;
-/** What follows the last node. */
+/** What the reader of three.js takes to follow the last node of the file, at the most; it is filled up to a multiple of 16 bytes. */
 const footBytes = 176;
 /** Of those that are no arrays, more say nothing here. */
 const mostProperties = 16;
@@ -36,6 +36,12 @@ export const isBinaryFbx = (bytes: Uint8Array): boolean =>
 export const versionOf = (bytes: Uint8Array): number =>
   new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength).getUint32(headBytes, true);
 
+/** Whether the reader of three.js takes what is there for the foot of the file. */
+function isFoot(at: number, size: number): boolean {
+  const end = at + footBytes;
+  return (size % 16 === 0 ? end - (end % 16) : end) >= size;
+}
+
 /** Throws a RangeError where the file ends too soon. */
 export function* fbxNodes(bytes: Uint8Array<ArrayBuffer>): Generator<FbxNode> {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
@@ -44,8 +50,10 @@ export function* fbxNodes(bytes: Uint8Array<ArrayBuffer>): Generator<FbxNode> {
   const field = (at: number) => (isLong ? Number(view.getBigUint64(at, true)) : number(at));
   const fieldBytes = isLong ? 8 : 4;
   // Each node is its end, the count and the bytes of its properties, its name, and the properties. Its children follow.
-  for (let at = headBytes + 4; at + footBytes < bytes.length;) {
+  let outerEnd = 0; // of the outermost node
+  for (let at = headBytes + 4; at < outerEnd || !isFoot(at, bytes.length);) {
     const [begin, end] = [at, field(at)];
+    if (begin >= outerEnd) outerEnd = end;
     const count = end === 0 ? 0 : field(at + fieldBytes);
     const nameAt = at + 3 * fieldBytes + 1;
     at = nameAt + view.getUint8(nameAt - 1);

@@ -1,4 +1,5 @@
 import { FileFault } from "lpdeform-client/mesh/fault";
+import { checkCopies, type Use } from "./uses.js";
 import { isNumber, type Tag, XmlText } from "./xml.js";
 
 // What a 3MF file has that the reader of three.js would leave out or tear without a word is refused by its part and line. Vertices and
@@ -13,17 +14,6 @@ const groupKinds: Readonly<Record<string, string>> = {
 const rootPart = /^3D\/[^/]*\.model$/;
 const anyPart = /^3D\/.*\.model$/;
 const relationships = /_rels\/\.rels$/;
-
-/** A place that names an object of the file. */
-interface Use {
-  xml: XmlText;
-  at: number;
-  /** Of the element. */
-  name: string;
-  object: string;
-  /** The object that has it as a component; none of an item. */
-  by: string | undefined;
-}
 
 /** Throws a FileFault. */
 export async function check3mf(name: string, bytes: Uint8Array<ArrayBuffer>): Promise<void> {
@@ -68,25 +58,10 @@ function checkRelationships(xml: XmlText, parts: ReadonlySet<string>): void {
 }
 
 function checkUses(objects: ReadonlyMap<string, string>, uses: readonly Use[]): void {
-  const components = new Map<string, Use[]>();
-  for (const use of uses) {
-    const { xml, at, name, object, by } = use;
+  for (const { xml, at, name, object } of uses) {
     if (!objects.has(object)) throw xml.fault(at, `<${name}> names the object “${object}”, which is not in the file`);
-    if (by === undefined) continue;
-    if (!components.has(by)) components.set(by, []);
-    components.get(by)!.push(use);
   }
-  const known = new Map<string, "open" | "whole">();
-  const visit = (object: string) => {
-    known.set(object, "open");
-    for (const use of components.get(object) ?? []) {
-      const state = known.get(use.object);
-      if (state === "open") throw use.xml.fault(use.at, `the object “${use.object}” is a component of itself`);
-      if (!state) visit(use.object);
-    }
-    known.set(object, "whole");
-  };
-  for (const object of components.keys()) if (!known.has(object)) visit(object);
+  checkCopies("object", uses, uses);
 }
 
 /** The object that is being read. */
@@ -157,6 +132,10 @@ class Model {
 
   #beginObject({ attributes, at }: Tag): void {
     const { id = "", pid, pindex } = attributes;
+    const outer = this.#object;
+    if (outer) {
+      throw this.xml.fault(at, `the object “${id}” stands in the object “${outer.id}” of line ${this.xml.lineOf(outer.at)}`);
+    }
     const other = this.objects.get(id);
     if (other !== undefined) throw this.xml.fault(at, `the object “${id}” is in the file twice, the other time in ${other}`);
     this.objects.set(id, this.part);

@@ -15,12 +15,12 @@ export interface Tag {
 
 export interface Element extends Tag {
   children: Element[];
-  /** What stands in it, without elements and comments. */
+  /** What stands in it, as a reader of XML gives it; none if there are elements. */
   text: string;
 }
 
-const tag = /<(\/?)([^\s/>!?<]+)((?:[^"'<>]|"[^"<]*"|'[^'<]*')*)>/y;
-const attribute = /([^\s=]+)\s*=\s*(?:"([^"]*)"|'([^']*)')/g;
+const tag = /<(\/?)([^\s/>!?<]+)(?=[\s/>])((?:[^"'<>]|"[^"<]*"|'[^'<]*')*)>/y;
+const attribute = /(?<=^|[\s"'])([^\s="']+)\s*=\s*(?:"([^"]*)"|'([^']*)')/g;
 /** What is no element, by its beginning, and its end. */
 const others = [
   ["<!--", "-->"],
@@ -95,7 +95,7 @@ export class XmlText {
     for (const tag of this.tags()) {
       if (tag.isEnd) {
         const element = open.pop() as Element;
-        if (element.children.length === 0) element.text = this.text.slice(element.end, tag.at).replace(/<!--.*?-->/gs, " ");
+        if (element.children.length === 0) element.text = plainText(this.text.slice(element.end, tag.at));
       } else {
         const element = { ...tag, children: [], text: "" };
         open.at(-1)!.children.push(element);
@@ -110,14 +110,29 @@ export class XmlText {
 function attributesIn(text: string): Record<string, string> {
   const found: Record<string, string> = {};
   attribute.lastIndex = 0;
-  for (let one = attribute.exec(text); one; one = attribute.exec(text)) found[one[1]!] = one[2] ?? one[3]!;
+  for (let one = attribute.exec(text); one; one = attribute.exec(text)) found[one[1]!] = plainText(one[2] ?? one[3]!);
   return found;
 }
 
-/** An element and all that stand in it. */
-export function* elementsIn(element: Element): Generator<Element> {
+const references: Readonly<Record<string, string>> = { lt: "<", gt: ">", amp: "&", quot: '"', apos: "'" };
+
+/** Without comments and instructions. References to characters become these; those to what the file itself defines stay. */
+function plainText(text: string): string {
+  if (!/[<&]/.test(text)) return text;
+  const special = /<!--.*?-->|<!\[CDATA\[(.*?)\]\]>|<\?.*?\?>|<!.*?>|&(?:#x([\da-fA-F]{1,6})|#(\d{1,7})|(\w+));/gs;
+  return text.replace(special, (whole: string, data?: string, hex?: string, decimal?: string, name?: string) => {
+    if (name !== undefined) return Object.hasOwn(references, name) ? references[name]! : whole;
+    if (hex === undefined && decimal === undefined) return data ?? "";
+    const code = hex === undefined ? Number(decimal) : parseInt(hex, 16);
+    return code <= 0x10ffff ? String.fromCodePoint(code) : whole;
+  });
+}
+
+/** An element and all that stand in it, but for those of the names `without` and what stands in them. */
+export function* elementsIn(element: Element, without: readonly string[]): Generator<Element> {
+  if (without.includes(element.name)) return;
   yield element;
-  for (const child of element.children) yield* elementsIn(child);
+  for (const child of element.children) yield* elementsIn(child, without);
 }
 
 export const wordsOf = (text: string): string[] =>
