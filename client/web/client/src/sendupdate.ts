@@ -2,12 +2,9 @@ import type { Lease } from "./lease.js";
 import type { NumberedUpdate } from "./ledger.js";
 import { Packer } from "./packer.js";
 import type { Rpc } from "./rpc.js";
-import { inTaskOfItsOwn } from "./task.js";
+import { inTaskOfItsOwn, largeVertices } from "./task.js";
 import { updateToWire } from "./towire.js";
 import { Uploads } from "./upload.js";
-
-/** From this number of vertices on, the task that changes a handle often draws for some milliseconds as well. */
-const largeVertices = 20_000;
 
 /** Sends an update, after uploading its large arrays. Resolves with whether it survives a restart of the server. */
 export async function sendUpdate(

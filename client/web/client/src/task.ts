@@ -17,6 +17,9 @@ export function inTaskOfItsOwn(task: () => void): void {
   port.postMessage(undefined);
 }
 
+/** From this number of vertices on, a page is busy for some milliseconds with a frame: unpacking it, or drawing it. */
+export const largeVertices = 20_000;
+
 /** A page is busy for about a millisecond with summing so many bytes, and less with copying them. */
 export const stepBytes = 1 << 19;
 

@@ -1,5 +1,6 @@
 import { decompress, distortionOf, loadDecompressor, normalsOf, positionsOf, uint16View } from "./decode.js";
 import { LpdeformError } from "./errors.js";
+import { largeVertices } from "./task.js";
 import type { FrameUnpacker, Packed, Unpacked } from "./types.js";
 
 /** Needs loadDecompressor() for compressed frames. Throws a LpdeformError (FRAME_PARTS) if a block cannot be read. */
@@ -86,8 +87,6 @@ export async function unpackLoaded(packed: Packed): Promise<Unpacked> {
   return unpack(packed);
 }
 
-/** From this number of vertices on, a page is busy for some milliseconds with unpacking a frame. */
-const largeVertices = 20_000;
 let shared: Unpacker | undefined;
 
 /** The page's unpacker, for frames of so many vertices; undefined for small ones, and outside of pages. */

@@ -156,7 +156,7 @@ export function makeBinaryTube(version: number, { points, triangles } = small, l
     name: "C",
     properties: [textProperty("OO"), idProperty(part), idProperty(owner)],
   });
-  const more = Array.from({ length: 8 }, (_, k) => link(2000 + k, 0)); // of what is not there, so that the links are longer than a foot
+  const more = Array.from({ length: 8 }, (_, k) => link(2000 + k, 0)); // links to nothing, so that the list is longer than a foot
   return makeBinary(version, [
     { name: "GlobalSettings", children: [{ name: "Version", properties: [idProperty(1000)] }] },
     {

@@ -1,11 +1,9 @@
 import { nothing, ofVertices } from "../model/pointed.js";
 import { type Brush, paintSoftly, strengthAt } from "../model/soft_paint.js";
 import type { PointerAt, Stroke } from "../stage/pointing.js";
+import { largeVertices } from "../stage/surface.js";
 import type { Pane } from "./pane.js";
 import type { Workbench } from "./workbench.js";
-
-/** From this number of vertices on, a step of the brush and the picture that the pointer's task draws would take too long together. */
-const largeVertices = 20_000;
 
 /** A stroke of the brush that paints p or stiffness. It is seen while it goes on, and is one step when it ends. */
 export class PaintStroke implements Stroke {
@@ -13,7 +11,7 @@ export class PaintStroke implements Stroke {
   readonly #strengths = new Map<number, number>();
   readonly #before;
   readonly #brush: Brush;
-  /** Places that are painted in a task of their own. */
+  /** Places of a large mesh, which are painted in a task of their own: that of the pointer draws a picture as well. */
   #ahead: PointerAt[] = [];
   #task: ReturnType<typeof setTimeout> | undefined;
 

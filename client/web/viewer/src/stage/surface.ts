@@ -21,7 +21,7 @@ export interface Scale {
 }
 
 /** From this number of vertices on, the GPU is sent more than a picture has time for. */
-const largeVertices = 20_000;
+export const largeVertices = 20_000;
 
 /** With this many vertices, lighting per vertex looks like lighting per pixel. */
 const denseVertices = 4000;
