@@ -125,7 +125,7 @@ export class OpenMesh {
 
   #know(derived: Derived): Derived {
     const { seams } = derived;
-    const whole = { ...derived, seams: seams && new Seams(seams.groups, seams.faces) }; // a worker's answer has no classes
+    const whole = { ...derived, seams: seams && new Seams(seams.groups, seams.faces, seams.copyCount) }; // a worker's answer has no classes
     know(this.mesh, whole);
     return whole;
   }

@@ -8,22 +8,17 @@ import { Pairs } from "./pairs.js";
  * change along a seam. The surface holds together only if such vertices count as one.
  */
 export class Seams {
-  /** How many vertices are copies of an earlier one. */
-  readonly copyCount: number;
   #members: Map<number, number[]> | undefined;
 
   /**
    * `groups`: for each vertex the first vertex in the same place, which may be the vertex itself. `faces`: those of the mesh, with
-   * the first vertex of each place.
+   * the first vertex of each place. `copyCount`: how many vertices are copies of an earlier one.
    */
   constructor(
     readonly groups: Uint32Array,
     readonly faces: Uint32Array,
-  ) {
-    let copyCount = 0;
-    for (let vertex = 0; vertex < groups.length; ++vertex) if (groups[vertex] !== vertex) ++copyCount;
-    this.copyCount = copyCount;
-  }
+    readonly copyCount = copiesIn(groups),
+  ) {}
 
   static of(groups: Uint32Array, meshFaces: Uint32Array): Seams {
     return new Seams(
@@ -50,6 +45,12 @@ export class Seams {
     });
     return found;
   }
+}
+
+function copiesIn(groups: Uint32Array): number {
+  let count = 0;
+  for (let vertex = 0; vertex < groups.length; ++vertex) if (groups[vertex] !== vertex) ++count;
+  return count;
 }
 
 /** The server's own tolerance, and the largest at which it takes groups. */

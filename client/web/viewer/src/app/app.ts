@@ -75,6 +75,7 @@ export class App implements Workbench {
   );
   #needsColours = true;
   #needsMarks = true;
+  #isToFit = false;
 
   constructor(readonly isWatching = false) {
     this.#panes.add("first");
@@ -227,7 +228,7 @@ export class App implements Workbench {
     this.#takeWelding();
     if (this.view.now.colourBy === "texture" && !this.isTextured) this.view.set({ colourBy: "distortion" });
     this.#openPanes();
-    this.fit();
+    this.#fitSoon();
   }
 
   /**
@@ -244,7 +245,7 @@ export class App implements Workbench {
 
   #present(): Kept {
     const { shape, detail, selected, isYUp, pinned, isWelded, weldTolerance } = this.view.now;
-    const { look } = this.panes[0]!.stage;
+    const { look } = this;
     const view = { shape, detail, selected, isYUp, pinned, isWelded, weldTolerance };
     return { mesh: this.mesh, document: this.document, view, look, steps: this.history.stepsSoFar };
   }
@@ -436,16 +437,36 @@ export class App implements Workbench {
   }
 
   fit(): void {
+    this.#isToFit = false;
     this.#panes.fit(this.view.now.isYUp);
+  }
+
+  /** In a task of its own, because the page has to be laid out for it; but before somebody asks for the look. */
+  #fitSoon(): void {
+    this.#isToFit = true;
+    setTimeout(() => this.fitIfWanted());
+  }
+
+  /** If a new mesh is still to be fitted into the pictures. */
+  fitIfWanted(): void {
+    if (this.#isToFit) this.fit();
+  }
+
+  /** From where the first picture is seen. */
+  get look(): Look {
+    this.fitIfWanted();
+    return this.panes[0]!.stage.look;
   }
 
   /** Turns the view to some vertices of the mesh. */
   lookAt(vertices: readonly number[]): void {
+    this.fitIfWanted();
     for (const pane of this.panes) pane.lookAt(vertices);
   }
 
   /** Changes the view by keys, in the picture with the focus or else the first; the other one follows. */
   changeView(change: (stage: Stage) => void): void {
+    this.fitIfWanted();
     this.#panes.changeView(change);
   }
 
@@ -456,11 +477,12 @@ export class App implements Workbench {
 
   /** The view along the next of the mesh's axes. */
   lookAlongNext(): void {
-    const { position, target } = this.panes[0]!.stage.look;
+    const { position, target } = this.look;
     this.lookAlong(viewAfter(subtract(position, target), this.view.now.isYUp));
   }
 
   lookFrom(look: Look): void {
+    this.fitIfWanted();
     this.#panes.lookFrom(look);
   }
 
@@ -511,6 +533,7 @@ export class App implements Workbench {
 
   #draw(now: number): void {
     this.#asked = 0;
+    this.fitIfWanted();
     let isNew = false;
     for (const pane of this.panes) {
       pane.shown(now);
@@ -583,7 +606,7 @@ export class App implements Workbench {
     }
     if (view.encoding !== before.encoding && this.mesh !== noMesh)
       for (const pane of this.panes) pane.open(this.mesh, this.document, view, this.#watched);
-    if (view.isYUp !== before.isYUp) this.fit();
+    if (view.isYUp !== before.isYUp) this.#fitSoon();
     this.#needsColours = this.#needsMarks = true;
     this.requestDraw();
   }

@@ -86,7 +86,7 @@ export class Keeper {
     );
     app.view.watchAll(() => this.#soon());
     app.afterDrawing.add(() => {
-      const camera = JSON.stringify(app.panes[0]!.stage.look);
+      const camera = JSON.stringify(app.look);
       if (camera !== this.#camera) this.#soon();
       this.#camera = camera;
     });

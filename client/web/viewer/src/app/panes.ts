@@ -125,7 +125,9 @@ export class Panes {
   #nameAll(): void {
     for (const { side, element, stage } of this.all) {
       const picture = this.all.length > 1 ? capital(`${placeOf(side)} picture`) : "Picture";
-      stage.canvas.setAttribute("aria-label", `${picture} of the surface, ${element.dataset["label"]}`);
+      const name = `${picture} of the surface, ${element.dataset["label"]}`;
+      if (stage.canvas.ariaLabel === name) continue;
+      stage.canvas.setAttribute("aria-label", name);
       stage.canvas.setAttribute("aria-describedby", keysText.id);
     }
   }

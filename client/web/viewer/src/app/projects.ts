@@ -5,8 +5,8 @@ import type { App } from "./app.js";
 
 /** The present work as a file. */
 export function saveProject(app: App): Promise<Uint8Array<ArrayBuffer>> {
-  const { mesh, document, view } = app;
-  return writeProject({ mesh, document, view: view.now, look: app.panes[0]!.stage.look });
+  const { mesh, document, view, look } = app;
+  return writeProject({ mesh, document, view: view.now, look });
 }
 
 /**

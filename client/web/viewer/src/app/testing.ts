@@ -2,11 +2,18 @@ import { anchorOfHandle, handleOf } from "../model/document.js";
 import { project } from "../model/selection.js";
 import { viewProjection } from "../stage/pointing.js";
 import type { App } from "./app.js";
-import type { Pane } from "./pane.js";
 
 /** What tests may read of the page: `window.__lpdeform`. Read only. */
 export function exposeForTests(app: App): void {
   const paneAt = (pane: number) => app.panes[pane]!;
+  /** In CSS pixels. */
+  const onPage = (pane: number, point: Float32Array) => {
+    app.fitIfWanted();
+    const { stage } = paneAt(pane);
+    const [x, y] = project(point, viewProjection(stage), stage.width, stage.height);
+    const box = stage.canvas.getBoundingClientRect();
+    return { x: box.left + x!, y: box.top + y! };
+  };
   const inspect = {
     app,
     positions: (pane = 0) => [...(paneAt(pane).frame?.positions ?? [])],
@@ -42,18 +49,10 @@ export function exposeForTests(app: App): void {
       };
     },
     vertexOnPage: (vertex: number, pane = 0) =>
-      onPage(paneAt(pane), Float32Array.from(paneAt(pane).stage.surface!.placeOf(vertex).toArray())),
-    pointOnPage: (point: readonly number[], pane = 0) => onPage(paneAt(pane), Float32Array.from(point)),
+      onPage(pane, Float32Array.from(paneAt(pane).stage.surface!.placeOf(vertex).toArray())),
+    pointOnPage: (point: readonly number[], pane = 0) => onPage(pane, Float32Array.from(point)),
     /** Where the gizmo is. */
-    anchorOnPage: (pane = 0) =>
-      onPage(paneAt(pane), Float32Array.from(anchorOfHandle(handleOf(app.document, app.view.now.selected)!))),
+    anchorOnPage: (pane = 0) => onPage(pane, Float32Array.from(anchorOfHandle(handleOf(app.document, app.view.now.selected)!))),
   };
   Object.assign(window, { __lpdeform: inspect });
-}
-
-/** In CSS pixels. */
-function onPage({ stage }: Pane, point: Float32Array): { x: number; y: number } {
-  const [x, y] = project(point, viewProjection(stage), stage.width, stage.height);
-  const box = stage.canvas.getBoundingClientRect();
-  return { x: box.left + x!, y: box.top + y! };
 }

@@ -31,7 +31,6 @@ export function legend(app: App): HTMLElement {
     const all = legendOf(app);
     element.hidden = all === undefined;
     pin.hidden = app.view.now.colourBy !== "distortion";
-    pin.setAttribute("aria-pressed", String(app.view.now.pinned !== undefined));
     if (!all) return;
     setText(title, all.title);
     setText(numbers[0], all.low);
@@ -39,6 +38,10 @@ export function legend(app: App): HTMLElement {
     setText(numbers[2], all.high);
   };
   app.view.watchAll(show);
+  app.view.watch(
+    ({ pinned }) => [pinned],
+    ([pinned]) => pin.setAttribute("aria-pressed", String(pinned !== undefined)),
+  );
   app.view.watch(
     ({ palette }) => [palette],
     ([palette]) => (bar.style.background = gradientOf(palette)),

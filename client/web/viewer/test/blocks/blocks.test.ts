@@ -58,10 +58,13 @@ function sayLongest(what: string, tasks: readonly Task[], trace: Trace): void {
   }
 }
 
+/** The GPU's process takes what it is told to draw, and draws nothing. */
+const drawsNothing = "--disable-gl-drawing-for-tests";
+
 const bare = (browser: Browser) => BarePage.open(browser, `${service.url}/?shape=sheet&detail=coarse`);
 
-async function opened(text: string): Promise<{ browser: Browser; page: BarePage }> {
-  const browser = await chromium.launch({ ...launch, args });
+async function opened(text: string, ...flags: string[]): Promise<{ browser: Browser; page: BarePage }> {
+  const browser = await chromium.launch({ ...launch, args: [...args, ...flags] });
   const page = await bare(browser);
   await page.settled();
   await page.openFile(join(folder, "ring.obj"), text);
@@ -69,21 +72,27 @@ async function opened(text: string): Promise<{ browser: Browser; page: BarePage 
   return { browser, page };
 }
 
-const vertexOnPage = (page: BarePage, turn: number, roll: number) =>
-  page.ask<{ x: number; y: number }>(`vertexOnPage(${ringVertex(around, across, turn, roll)})`);
+const vertexOnPage = (page: BarePage, turn: number, roll: number, [one, other] = [around, across]) =>
+  page.ask<{ x: number; y: number }>(`vertexOnPage(${ringVertex(one, other, turn, roll)})`);
 
-it(
-  "a drag",
-  async () => {
-    const { browser, page } = await opened(ringObj(around, across));
-    for (const turn of [0.62, 0.88]) await page.click(await vertexOnPage(page, turn, 0.2));
+it.each([
+  ["a drag", around, across, true] as const,
+  ["a drag where nothing is drawn", 146, 69, false] as const,
+  ["a drag where nothing is drawn", 291, 138, false] as const,
+  ["a drag where nothing is drawn", around, across, false] as const,
+])(
+  "%s, %d x %d vertices",
+  async (title, one, other, isDrawn) => {
+    const { browser, page } = await opened(ringObj(one, other), ...(isDrawn ? [] : [drawsNothing]));
+    const place = (turn: number) => vertexOnPage(page, turn, 0.2, [one, other]);
+    for (const turn of [0.62, 0.88]) await page.click(await place(turn));
     await page.settled();
     await page.evaluate(`(${watchDrag.toString()})()`);
-    const at = await vertexOnPage(page, 0.88, 0.2);
+    const at = await place(0.88);
     const trace = await Trace.start(browser, profile);
     await page.mouse("mouseMoved", at.x, at.y);
     await page.mouse("mousePressed", at.x, at.y);
-    await stir(page, at, seconds);
+    await stir(page, at, seconds, isDrawn ? 16 : 3); // more than sixty times a second
     const { tasks, marks } = await trace.stop("frame-taken");
     const pictures = trace
       .marks("picture-drawn")
@@ -93,18 +102,19 @@ it(
     );
     await page.mouse("mouseReleased", at.x, at.y);
     await browser.close();
-    note("drag: intake of a frame", tasksByMark(tasks, marks, "before"));
+    const name = `${title}, ${(one * other).toLocaleString("en")} vertices`;
+    note(`${name}: a frame`, tasksByMark(tasks, marks, "before"));
     note(
-      "drag: a picture without a new frame",
+      `${name}: a picture between`,
       pictures.map((drawn) => tasks.filter((task) => has(task, drawn))),
     );
-    sayLongest("drag", tasks, trace);
+    sayLongest(name, tasks, trace);
     const [gaps, corrections] = [watched.gaps, watched.corrections].map((all) =>
       [0.5, 0.95, 1].map((share) => percentile(all, share).toFixed(1)).join(" / "),
     );
     const rate = (count: number) => (count / watched.seconds).toFixed(1);
     notes.push(
-      `drag: ${rate(marks.length)} frames and ${rate(watched.pictures)} pictures a second; between handle and surface ${gaps} pixels, ` +
+      `${name}: ${rate(marks.length)} frames and ${rate(watched.pictures)} pictures a second; between handle and surface ${gaps} pixels, ` +
         `median / p95 / most. A frame puts the vertex that it moves most ${corrections} pixels from where it was drawn ahead.`,
     );
   },
