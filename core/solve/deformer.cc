@@ -21,7 +21,7 @@ constexpr std::size_t kWorkspace = 14;
 // What a Deformer holds besides: x, positions, x_before_move, energies and weights.
 constexpr std::size_t kStates = 4;
 constexpr std::size_t kCellBytes = 96, kEdgeBytes = 30;  // of CellPass: per vertex, per directed edge
-constexpr std::size_t kCoarseShare = 6;                  // the coarse levels take about 1 / kCoarseShare more
+constexpr std::size_t kCoarseShare = 4;                  // the coarse levels take about 1 / kCoarseShare more
 constexpr std::int32_t kCoarsenBeforehand = 10000;  // vertices from which on cold solves have a coarse level
 
 /// Memory of a Deformer without its metric.
@@ -236,6 +236,10 @@ const Points& Deformer::positions() const {
 }
 
 std::size_t Deformer::memory_bytes() const {
+  return idle_memory_bytes() + kWorkspace * impl_->x.size() * sizeof(double);
+}
+
+std::size_t Deformer::idle_memory_bytes() const {
   const std::size_t points = impl_->x.size() * sizeof(double);
   const std::size_t numbers =
       impl_->x.size() + impl_->positions.size() + impl_->x_before_move.size() + impl_->best_energies.size();
@@ -244,7 +248,7 @@ std::size_t Deformer::memory_bytes() const {
   const std::size_t searched = (impl_->better ? points : 0) + (impl_->search ? 3 * points : 0);
   const std::size_t looked_at = impl_->best_step ? points : 0;
   return sizeof(Impl) + searched + looked_at + held + coarse + impl_->objective.cells().memory_bytes() +
-         impl_->metric.memory_bytes() + numbers * sizeof(double) + kWorkspace * points +
+         impl_->metric.memory_bytes() + numbers * sizeof(double) +
          (impl_->coarse_mesh ? impl_->coarse_mesh->memory_bytes() : 0);
 }
 

@@ -127,6 +127,8 @@ class Deformer {
 
   /// Bytes held while solving, without the shared rest shape.
   std::size_t memory_bytes() const;
+  /// Bytes held between solves.
+  std::size_t idle_memory_bytes() const;
 
  private:
   struct Impl;

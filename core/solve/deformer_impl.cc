@@ -46,7 +46,7 @@ class DeformerOfLevel : public LevelSolver {
     return !summary.minima.empty() && summary.energy < summary.minima.front();
   }
   const Points& positions() const override { return deformer_->positions(); }
-  std::size_t memory_bytes() const override { return deformer_->memory_bytes(); }
+  std::size_t memory_bytes() const override { return deformer_->idle_memory_bytes(); }
 
  private:
   std::unique_ptr<Deformer> deformer_;

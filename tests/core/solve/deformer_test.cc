@@ -324,5 +324,27 @@ TEST(Deformer, AsksBeforeItTakesMemory) {
   }
 }
 
+TEST(Deformer, AsksForItsCoarseLevelsToo) {
+  const int side = 180;
+  const TriangleMesh mesh = grid(side, side, 2);
+  const auto shape = rest_shape(mesh);
+  std::size_t asked = 0;
+  const DeformerOptions options{.admit = [&](std::size_t bytes) {
+    asked = bytes;
+    return absl::OkStatus();
+  }};
+  auto solver = Deformer::create(shape, options).value();
+  const auto move_to = [&](double height) {
+    HandleSet handles;
+    (void)handles.set("left", {slice(mesh, 0, 0, 0), Fixed{}});
+    (void)handles.set("right", {slice(mesh, 0, side, side), RigidMotion{.translation = {0, 0, height}}});
+    ASSERT_TRUE(solver->set_handles(handles).ok());
+    ASSERT_TRUE(solver->solve({.max_iterations = 3}).ok());
+  };
+  move_to(1);
+  move_to(2);  // led by the coarse levels
+  EXPECT_NEAR(static_cast<double>(asked) / static_cast<double>(solver->memory_bytes()), 1, 0.05);
+}
+
 }  // namespace
 }  // namespace lpdeform
