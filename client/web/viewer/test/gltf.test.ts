@@ -150,6 +150,12 @@ describe("a GLB file", () => {
     expect(() => parseMesh("a.glb", with_(change))).toThrow(words);
   });
 
+  it("whose chunk of JSON is longer than the file is refused by the chunk", () => {
+    const bytes = glb.slice();
+    new DataView(bytes.buffer).setUint32(12, 0xffffffff, true);
+    expect(() => parseMesh("a.glb", bytes)).toThrow("a.glb ends within its chunk JSON.");
+  });
+
   it("that breaks off or is damaged is refused or read, and nothing else", () => {
     let seed = 1;
     const below = (count: number) => (seed = (seed * 48271) % 2147483647) % count;

@@ -186,7 +186,9 @@ describe("history", () => {
   it("makes one step of a gesture", () => {
     const history = new History(0);
     for (const value of [1, 2, 3]) history.during(value);
+    expect(history.settled).toBe(0);
     history.end();
+    expect(history.settled).toBe(3);
     history.push(4);
     expect(history.undo() && history.present).toBe(3);
     expect(history.undo() && history.present).toBe(0);

@@ -126,6 +126,18 @@ it.each([
   expect(derive({ ...mesh, exact }, { tolerance: 1e-3, isOn: true }).looseCount).toBe(0);
 });
 
+it("a fine border that is whole is not told to come apart, however long the edges beside it", () => {
+  const count = 5000;
+  const positions = new Float32Array(3 * (count + 1));
+  for (let k = 0; k < count; ++k)
+    positions.set([Math.cos((2 * Math.PI * k) / count), Math.sin((2 * Math.PI * k) / count), 0], 3 * k);
+  const faces = Uint32Array.from(
+    { length: 3 * count },
+    (_, k) => [count, Math.floor(k / 3), (Math.floor(k / 3) + 1) % count][k % 3]!,
+  );
+  expect(derive({ name: "fan", positions, faces }, usualWelding).looseCount).toBe(0);
+});
+
 it.each(shapeKinds.map(({ id, make }) => [id, make("medium").mesh] as const))("the shape %s has no such borders", (_, mesh) => {
   expect(derive(mesh, usualWelding).looseCount).toBe(0);
 });

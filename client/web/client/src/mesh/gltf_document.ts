@@ -60,9 +60,10 @@ function chunksOf(name: string, bytes: Uint8Array): Chunks {
   const view = viewOf(bytes);
   if (bytes.length < 20 || view.getUint32(4, true) !== 2) throw new FileFault(`${name} is no GLB of version 2.`);
   const length = view.getUint32(12, true);
-  if (view.getUint32(8, true) > bytes.length || 20 + length > bytes.length) {
+  if (view.getUint32(8, true) > bytes.length) {
     throw new FileFault(`${name} ends too soon: it has ${bytes.length} of ${view.getUint32(8, true)} bytes.`);
   }
+  if (20 + length > bytes.length) throw new FileFault(`${name} ends within its chunk JSON.`);
   if (view.getUint32(16, true) !== jsonChunk) throw new FileFault(`${name} does not begin with JSON.`);
   const text = bytes.subarray(20, 20 + length);
   const at = 28 + length;

@@ -73,20 +73,34 @@ export function seamsOf(mesh: Mesh, tolerance: number): Seams | undefined {
 /** What lies near is within this share of the diagonal, and of the mean edge. */
 const [nearDiagonal, nearEdge] = [1e-3, 0.1];
 
+/** Among how many vertices a way is looked for from one to another that lies near it. */
+const mostOnTheWay = 64;
+
 /**
- * How many vertices on open borders lie near others there with which they share no edge: the surface looks whole there, and tears.
- * `faces`: the mesh's, welded or not; `edge`: the mean edge.
+ * How many vertices on open borders lie near others there to which no way leads along edges nearby: the surface looks whole there, and
+ * tears. `faces`: the mesh's, welded or not; `edge`: the mean edge.
  */
 export function looseVertices(mesh: Mesh, faces: Uint32Array, { starts, neighbours }: Adjacency, edge: number): number {
   const positions = mesh.exact ?? mesh.positions;
   const border = borderVertices(faces);
   const { diagonal } = boundsOf(positions, faces);
-  const places = new Places(positions, Math.min(nearDiagonal * diagonal, nearEdge * edge), cellShare * diagonal);
+  const near = Math.min(nearDiagonal * diagonal, nearEdge * edge);
+  const places = new Places(positions, near, cellShare * diagonal);
+  const isJoined = (vertex: number, other: number) => {
+    const seen = new Set([vertex]);
+    for (const one of seen) {
+      for (const next of neighbours.subarray(starts[one]!, starts[one + 1]!)) {
+        if (next === other) return true;
+        if (distance(positions, vertex, next) <= 2 * near) seen.add(next);
+      }
+      if (seen.size > mostOnTheWay) return true; // a border of many vertices in one place
+    }
+    return false;
+  };
   const loose = new Set<number>();
   for (const vertex of border) {
     if (places.distances > mostDistances * border.length) break; // that many are near each other
-    const own = new Set(neighbours.subarray(starts[vertex]!, starts[vertex + 1]!));
-    for (const other of places.near(vertex)) if (!own.has(other)) loose.add(vertex).add(other);
+    for (const other of places.near(vertex)) if (!isJoined(vertex, other)) loose.add(vertex).add(other);
     places.add(vertex);
   }
   return loose.size;

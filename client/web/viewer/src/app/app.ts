@@ -52,8 +52,8 @@ export class App implements Workbench {
   readonly #asides = new Asides();
   #isBroughtBack = false;
   #isKeyHeld = false;
-  /** The last handle that was selected when it went. */
-  #deselected: string | undefined;
+  /** The handles that were selected when the first of them went. */
+  #deselected: readonly string[] = [];
   #asked = 0;
   readonly #pace = new Pace(() => this.requestDraw());
   readonly #editings = new Set<Editing>();
@@ -222,6 +222,7 @@ export class App implements Workbench {
       report: undefined,
       problem: undefined,
       restoredFrom: undefined,
+      notice: undefined,
       pointedOut: nothing,
       setAside: this.#asides.names,
     });
@@ -390,8 +391,10 @@ export class App implements Workbench {
     this.#documentChanged(performance.now());
     if (this.view.now.selected !== undefined) return;
     const back = this.document.handles.filter(({ name }) => !handles.some((one) => one.name === name));
-    const one = back.find(({ name }) => name === this.#deselected) ?? (back.length === 1 ? back[0] : undefined);
-    if (one) this.view.set({ selected: one.name });
+    const names = back.map(({ name }) => name);
+    const selected = this.#deselected.filter((name) => names.includes(name));
+    const [first, ...alsoSelected] = selected.length > 0 || names.length > 1 ? selected : names;
+    if (first !== undefined) this.view.set({ selected: first, alsoSelected });
   }
 
   redo(): void {
@@ -613,7 +616,7 @@ export class App implements Workbench {
 
   #documentChanged(time: number): void {
     const { document, history } = this;
-    const { selected } = this.view.now;
+    const { selected, alsoSelected } = this.view.now;
     const before = this.facts.now.document;
     if (document.handles !== before.handles) this.#needsMarks = true;
     if (document !== before) this.#needsColours = true;
@@ -623,7 +626,7 @@ export class App implements Workbench {
     this.facts.set({ document, canUndo: history.canUndo, canRedo: history.canRedo, problem });
     this.#showBetter();
     if (selected !== undefined && !handleOf(document, selected)) {
-      this.#deselected = selected;
+      this.#deselected = [selected, ...alsoSelected];
       this.view.set({ selected: undefined });
     }
     this.requestDraw();

@@ -2,14 +2,19 @@ import type { Box } from "../model/free_room.js";
 
 const controls = ".rail, .options, .legend, .dock, .split ~ .dock > *";
 /** Where small.css puts the controls beside the pictures. */
-const littleRoom = matchMedia("(max-width: 720px), (min-aspect-ratio: 1/1) and (max-height: 560px)");
+const littleRoom = matchMedia(
+  "(max-width: 720px), (min-aspect-ratio: 1/1) and (max-height: 560px), " +
+    "(max-width: 900px) and (max-height: 900px), (max-width: 1000px) and (max-height: 600px)",
+);
 const margin = 8;
+/** The arrow of a handle at the top of the surface. */
+const arrow = 44;
 
 /** What the page's controls cover of a picture, in pixels from its corner. */
 export function coversOf(picture: HTMLElement): Box[] {
   const { left, top, right, bottom, width } = picture.getBoundingClientRect();
   // The connection, and the hint where it is over the picture, also before there is one.
-  const messages = littleRoom.matches ? 48 : width > 620 ? 98 : 110;
+  const messages = littleRoom.matches ? 48 : arrow + (width > 620 ? 98 : 110);
   const boxes = [...document.querySelectorAll(controls)].map((control) => control.getBoundingClientRect());
   return [
     { left: 0, top: 0, right: right - left, bottom: messages },

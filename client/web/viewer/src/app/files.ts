@@ -7,7 +7,7 @@ import { keepOnly, openedMesh } from "../io/opened.js";
 import { rewriteObj } from "../io/obj_rewrite.js";
 import { writeOff } from "../io/write_off.js";
 import { writePly } from "../io/write_ply.js";
-import { emptyDocument } from "../model/document.js";
+import { type Document, emptyDocument } from "../model/document.js";
 import { derivedOf } from "lpdeform-client/mesh/derived";
 import { isAtRest, type Mesh, type WrittenMesh } from "lpdeform-client/mesh/mesh";
 import { short } from "../model/words.js";
@@ -32,6 +32,8 @@ const isProject = ({ name }: File) => /\.lpdeform$/i.test(name);
 const isForeign = ({ name }: File) => /\.(fbx|dae|3mf)$/i.test(name);
 const isMesh = (file: File) => /\.(glb|gltf|off|obj|ply|stl)$/i.test(file.name) || isForeign(file);
 
+const handlesOf = ({ handles }: Document) => (handles.length === 1 ? "a handle" : `${handles.length} handles`);
+
 interface Exported {
   positions: Float32Array | Float64Array;
   distortion: Float32Array | Float64Array;
@@ -42,6 +44,8 @@ export type MeshFormat = "glb" | "ply" | "obj" | "off" | "stl";
 /** Opens and saves files. */
 export class Files {
   readonly #input = document.createElement("input");
+  /** The end of what was opened last: handles that are opened after a mesh are for that mesh. */
+  #opened: Promise<unknown> = Promise.resolve();
 
   constructor(readonly app: App) {
     this.#input.type = "file";
@@ -91,13 +95,22 @@ export class Files {
     checkSize(file.name, file.size);
     const done = file.size > largeBytes ? this.app.notifyWhile(`Opening ${file.name}…`) : () => undefined;
     try {
-      if (isProject(file)) return await this.#openProject(file);
-      if (isHandles(file)) return await this.#openHandles(file);
-      if (isForeign(file)) return await this.#openForeign(file);
-      return await this.#openMesh(async () => openedMesh(file, await besideOf(file, files)));
+      if (!isHandles(file)) {
+        const opening = this.#openWork(file, files);
+        this.#opened = opening.catch(() => undefined);
+        return await opening;
+      }
+      await this.#opened;
+      return await this.#openHandles(file);
     } finally {
       done();
     }
+  }
+
+  async #openWork(file: File, files: readonly File[]): Promise<boolean> {
+    if (isProject(file)) return this.#openProject(file);
+    if (isForeign(file)) return this.#openForeign(file);
+    return this.#openMesh(async () => openedMesh(file, await besideOf(file, files)));
   }
 
   async #openForeign(file: File): Promise<boolean> {
@@ -179,8 +192,7 @@ export class Files {
 
   async #openProject(file: File): Promise<boolean> {
     if (!(await openProject(this.app, file))) return false;
-    const count = this.app.document.handles.length;
-    this.app.notify(`${file.name}: “${this.app.mesh.name}” with ${count === 1 ? "a handle" : `${count} handles`}.`);
+    this.app.notify(`${file.name}: “${this.app.mesh.name}” with ${handlesOf(this.app.document)}.`);
     return true;
   }
 
@@ -220,7 +232,7 @@ export class Files {
       return false;
     }
     const { name } = mesh;
-    const { p, secondP } = this.app.document;
+    const { p, secondP } = this.app.history.settled; // poses that play change them
     this.app.open(mesh, { ...emptyDocument, p, secondP });
     const { isYUp } = derivedOf(mesh);
     this.app.view.set({ tool: "move", isYUp });
@@ -246,7 +258,7 @@ export class Files {
       true,
     );
     app.view.set({ selected: app.document.handles.at(-1)!.name });
-    app.notify(`${name}: ${app.document.handles.length} handles.`);
+    app.notify(`${name}: ${handlesOf(app.document)}.`);
     return true;
   }
 

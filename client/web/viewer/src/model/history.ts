@@ -25,6 +25,11 @@ export class History<Value> {
     return this.#present;
   }
 
+  /** Without a gesture that has not ended. */
+  get settled(): Value {
+    return this.#before ?? this.#present;
+  }
+
   get canUndo(): boolean {
     return this.#past.length > 0 || (this.#before !== undefined && this.#before !== this.#present);
   }

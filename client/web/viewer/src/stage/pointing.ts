@@ -58,15 +58,16 @@ export class Pointing {
   }
 
   get isBusy(): boolean {
-    return this.#stroke !== undefined;
+    return this.#stroke !== undefined || this.#press !== undefined;
   }
 
-  /** False if there is no stroke. */
+  /** Of a stroke, or of a press that would become a click. False if there is neither. */
   cancel(): boolean {
     const taken = this.#stroke;
-    this.#stroke = undefined;
+    const wasPressed = this.#press !== undefined;
+    this.#stroke = this.#press = undefined;
     taken?.stroke.cancel();
-    return taken !== undefined;
+    return taken !== undefined || wasPressed;
   }
 
   at(event: PointerEvent | MouseEvent): PointerAt {

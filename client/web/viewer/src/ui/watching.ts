@@ -3,7 +3,7 @@ import type { App } from "../app/app.js";
 import { sessionOf, watchedIn, watchedStatus } from "../link/watched.js";
 import { say } from "../link/status.js";
 import { button } from "./controls.js";
-import { el } from "./dom.js";
+import { el, setText } from "./dom.js";
 import { icon } from "./icons.js";
 import { legend } from "./legend.js";
 import { lookPanel } from "./look.js";
@@ -61,11 +61,16 @@ function bar(app: App): HTMLElement {
     panel.setAttribute("aria-pressed", String(isPanelOpen));
     document.body.classList.toggle("panel-closed", !isPanelOpen);
   });
+  const state = el("strong");
+  app.facts.watch(
+    ({ status }) => [status],
+    ([{ kind }]) => setText(state, kind === "live" ? "Watching live" : "Watching"),
+  );
   return el(
     "header",
     { className: "topbar" },
     title(),
-    el("strong", {}, "Watching live"),
+    state,
     el("span", { className: "space" }),
     button("fit", "Show all of it", () => app.fit()),
     theme,

@@ -158,6 +158,24 @@ it("a drag whose mesh makes room for another leaves that one alone", async () =>
   expect(await user.ask("app.facts.now.setAside.length")).toBe(1); // with what the drag has done
 });
 
+it("a press that Escape or another mesh comes upon places no handle", async () => {
+  const place = await user.vertexOnPage(0);
+  const { mouse, keyboard } = user.page;
+  for (const between of [
+    () => keyboard.press("Escape"),
+    () => user.page.evaluate('__lpdeform.app.openShape("bar", "coarse")'),
+  ]) {
+    await user.ask(`app.view.set({ selected: undefined, tool: "move" })`);
+    await mouse.move(place.x, place.y);
+    await mouse.down();
+    await between();
+    const count = await user.ask<number>("document().handles.length");
+    await mouse.up();
+    expect(await user.ask("document().handles.length")).toBe(count);
+    expect(await user.ask("app.history.canUndo")).toBe(false);
+  }
+});
+
 it("a handle whose drag the browser ends goes back", async () => {
   await user.page.keyboard.press("t");
   const { x, y } = await anchor();

@@ -142,20 +142,37 @@ it("an OBJ file keeps what it has beside where it is saved as such, and it is sa
   );
 });
 
-it("of two files the one that was opened last stays, however long the first one takes", async () => {
+/** An OBJ that takes long to open. */
+function longObj(): string {
   const size = 300;
   const vertices = Array.from({ length: size * size }, (_, k) => `v ${k % size} ${Math.floor(k / size)} 0`);
   const faces = Array.from({ length: size * size - size }, (_, k) => k + 1).filter((k) => k % size !== 0);
-  const long = `${vertices.join("\n")}\n${faces.map((k) => `f ${k} ${k + 1} ${k + size}`).join("\n")}\n`;
+  return `${vertices.join("\n")}\n${faces.map((k) => `f ${k} ${k + 1} ${k + size}`).join("\n")}\n`;
+}
+
+const dropInPage = `(name, text) => {
+  const event = new DragEvent("drop", { dataTransfer: new DataTransfer(), bubbles: true });
+  event.dataTransfer.items.add(new File([text], name));
+  document.body.dispatchEvent(event);
+}`;
+
+it("handles that are dropped while a mesh is still being read are for that mesh, and its notice is there, not that of another", async () => {
+  const handles = JSON.stringify({ handles: [{ name: "Corner", vertices: [89_999] }] });
+  await user.page.evaluate(
+    `(${dropInPage})("wide.obj", ${JSON.stringify(longObj())}); (${dropInPage})("wide.json", ${JSON.stringify(handles)})`,
+  );
+  await isOpen("wide.obj");
+  await expect.poll(() => user.ask("document().handles.map(({ name }) => name)")).toEqual(["Corner"]);
+  await expect.poll(() => user.page.locator(".notice").textContent()).toContain("wide.json: a handle.");
+  await user.ask(`app.openShape("bar", "coarse")`);
+  expect(await user.page.locator(".notice").isHidden()).toBe(true);
+});
+
+it("of two files the one that was opened last stays, however long the first one takes", async () => {
   await user.page.evaluate(`window.opened = [];
     window.__lpdeform.app.facts.watch(({ mesh }) => [mesh], ([{ name }]) => window.opened.push(name))`);
-  const inPage = `(name, text) => {
-    const event = new DragEvent("drop", { dataTransfer: new DataTransfer(), bubbles: true });
-    event.dataTransfer.items.add(new File([text], name));
-    document.body.dispatchEvent(event);
-  }`;
   await user.page.evaluate(
-    `(${inPage})("long.obj", ${JSON.stringify(long)}); (${inPage})("short.off", ${JSON.stringify(writeOff(mesh))})`,
+    `(${dropInPage})("long.obj", ${JSON.stringify(longObj())}); (${dropInPage})("short.off", ${JSON.stringify(writeOff(mesh))})`,
   );
   await isOpen("short.off");
   await user.page.waitForTimeout(4000);

@@ -32,8 +32,10 @@ const states = [false, true].flatMap((isSplit) =>
 
 /** Where room is little, these leave the pictures free. */
 const beside = [".topbar", ".rail", ".options", ".dock", ".panel", ".hint", ".legend"];
-const isLittle = (width: number, height: number) => (width <= 720 && width <= height) || (height <= 560 && height <= width);
-const little = sizes.filter(([width, height]) => isLittle(width, height));
+const isTelephone = (width: number, height: number) => (width <= 720 && width <= height) || (height <= 560 && height <= width);
+const isLittle = (width: number, height: number) =>
+  isTelephone(width, height) || (width <= 900 && height <= 900) || (width <= 1000 && height <= 600);
+const little = sizes.filter(([width, height]) => isTelephone(width, height));
 const drawn = ({ page }: User) =>
   page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 

@@ -77,6 +77,7 @@ it("Ctrl+A selects all that are not locked; keys turn them as one, delete them a
   expect([...(await handles()).keys()]).toEqual(["Feet"]);
   await press("Control+z");
   expect([...(await handles()).keys()]).toEqual(["Feet", "Tail", "Head"]);
+  expect(await selection()).toBe("Tail Head");
 });
 
 it("Ctrl and a click on a handle select it, too, and a click without Ctrl selects one alone", async () => {

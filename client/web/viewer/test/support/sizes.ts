@@ -1,4 +1,4 @@
-/** Of pages, in CSS pixels: from a small telephone to 4K, upright and on their side. */
+/** Of pages, in CSS pixels: from a small telephone to 4K, upright and on their side, and of narrow windows. */
 export const sizes: readonly (readonly [number, number])[] = [
   [360, 640],
   [390, 844],
@@ -6,10 +6,15 @@ export const sizes: readonly (readonly [number, number])[] = [
   [600, 960],
   [640, 360],
   [667, 375],
+  [721, 561],
+  [721, 900],
   [740, 360],
   [768, 1024],
+  [800, 600],
   [844, 390],
+  [900, 700],
   [932, 430],
+  [960, 561],
   [1024, 600],
   [1024, 768],
   [1280, 720],
