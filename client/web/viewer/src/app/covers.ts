@@ -1,6 +1,8 @@
 import type { Box } from "../model/free_room.js";
 
 const controls = ".rail, .options, .legend, .dock, .split ~ .dock > *";
+/** What the page says of the work that has just been opened. Where room is little, it goes over the shape until the next press. */
+const said = ", .notice, .aside, .restored, .banner";
 /** Where small.css puts the controls beside the pictures. */
 const littleRoom = matchMedia(
   "(max-width: 720px), (min-aspect-ratio: 1/1) and (max-height: 560px), " +
@@ -15,7 +17,8 @@ export function coversOf(picture: HTMLElement): Box[] {
   const { left, top, right, bottom, width } = picture.getBoundingClientRect();
   // The connection, and the hint where it is over the picture, also before there is one.
   const messages = littleRoom.matches ? 48 : arrow + (width > 620 ? 98 : 110);
-  const boxes = [...document.querySelectorAll(controls)].map((control) => control.getBoundingClientRect());
+  const shown = littleRoom.matches ? controls : controls + said;
+  const boxes = [...document.querySelectorAll(shown)].map((control) => control.getBoundingClientRect());
   return [
     { left: 0, top: 0, right: right - left, bottom: messages },
     { left: 0, top: bottom - top - margin, right: right - left, bottom: bottom - top },

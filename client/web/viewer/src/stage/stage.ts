@@ -162,7 +162,8 @@ export class Stage {
     // A part in the middle is better than one aside where the surface would be a little larger.
     const aside = ({ left, top, right: end, bottom: below }: Box) =>
       Math.hypot((left + end) / right - 1, (top + below) / bottom - 1);
-    const free = freeRoom(whole, covers, (part) => -distanceIn(part) * (1 + aside(part)));
+    const room = freeRoom(whole, covers, (part) => -distanceIn(part) * (1 + aside(part)));
+    const free = room.left < room.right ? room : whole;
     this.#covered = { left: free.left, top: free.top, right: right - free.right, bottom: bottom - free.bottom };
     this.#center();
     camera.position.copy(this.target).addScaledVector(away, Math.min(distanceIn(free), mostFar * distanceIn(whole)));

@@ -55,6 +55,28 @@ it.each([
   expect(await user.ask("app.panes[0].stage.surface.mesh.name")).toBe(name);
 });
 
+it.each([
+  [1280, 800],
+  [1920, 1080],
+  [1024, 600],
+])("what is said of a mesh that was opened does not lie over it at %d x %d", async (width, height) => {
+  await user.page.setViewportSize({ width, height });
+  await user.ask(`app.view.set({ isPanelOpen: true })`);
+  await user.ask(`app.openShape("bar", "coarse")`);
+  await drop({ "tower.off": writeOff(mesh) });
+  await isOpen("tower.off");
+  await user.page.locator(".notice", { hasText: "tower.off" }).waitFor();
+  const covered = await user.page.evaluate(() => {
+    const places = Array.from({ length: (window as any).__lpdeform.app.mesh.positions.length / 3 }, (_, vertex) =>
+      (window as any).__lpdeform.vertexOnPage(vertex),
+    );
+    const boxes = [...document.querySelectorAll(".notice, .aside")].map((one) => one.getBoundingClientRect());
+    return places.filter(({ x, y }) => boxes.some((box) => x > box.left && x < box.right && y > box.top && y < box.bottom))
+      .length;
+  });
+  expect(covered).toBe(0);
+});
+
 it("a mesh is dropped with its handles and what else lies beside it, in any order", async () => {
   const handles = JSON.stringify({
     handles: [
