@@ -104,7 +104,7 @@ export class Pointing {
       return;
     }
     if (event.button !== 0 || this.isViewOnly || this.stage.gizmo.isDragging) return;
-    if (this.stage.gizmo.isHot && event.pointerType !== "touch") return;
+    if (this.stage.gizmo.isHot && event.pointerType !== "touch") return this.target.hover(undefined);
     const at = this.at(event);
     const stroke = this.target.press(at);
     if (stroke) {

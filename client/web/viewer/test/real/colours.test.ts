@@ -44,6 +44,12 @@ it("the pointer reads distortion and p of the vertex under it, and the cross doe
   await user.page.keyboard.press("v");
   await readout.waitFor({ state: "hidden" });
   await user.page.keyboard.press("v");
+  const gizmo = await user.ask<{ x: number; y: number }>("anchorOnPage()");
+  await user.page.mouse.move(gizmo.x, gizmo.y);
+  await readout.waitFor();
+  await user.page.mouse.down();
+  await readout.waitFor({ state: "hidden" }); // what it said is not so during the drag
+  await user.page.mouse.up();
   await user.page.locator("canvas.stage").focus();
   await user.page.keyboard.press("Enter");
   await readout.filter({ hasText: /^Vertex \d+ · distortion/ }).waitFor();
