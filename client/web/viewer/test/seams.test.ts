@@ -126,8 +126,16 @@ it.each([
   expect(derive({ ...mesh, exact }, { tolerance: 1e-3, isOn: true }).looseCount).toBe(0);
 });
 
-it("a fine border that is whole is not told to come apart, however long the edges beside it", () => {
-  const count = 5000;
+it("a fine border that is torn is told whole, and a way around its ends does not join it", () => {
+  const fine = 2000;
+  const mesh = splitTube(columns, fine);
+  const { diagonal } = boundsOf(mesh.positions, mesh.faces);
+  const exact = Float64Array.from(mesh.positions);
+  for (let row = 0; row <= fine; ++row) exact[3 * (row * (columns + 1) + columns)]! += 1e-5 * diagonal;
+  expect(derive({ ...mesh, exact }, usualWelding).looseCount).toBe(2 * (fine + 1));
+});
+
+it.each([5000, 50_000])("a border of %d vertices that is whole is not told to come apart", (count) => {
   const positions = new Float32Array(3 * (count + 1));
   for (let k = 0; k < count; ++k)
     positions.set([Math.cos((2 * Math.PI * k) / count), Math.sin((2 * Math.PI * k) / count), 0], 3 * k);

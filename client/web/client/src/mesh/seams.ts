@@ -73,8 +73,8 @@ export function seamsOf(mesh: Mesh, tolerance: number): Seams | undefined {
 /** What lies near is within this share of the diagonal, and of the mean edge. */
 const [nearDiagonal, nearEdge] = [1e-3, 0.1];
 
-/** Among how many vertices a way is looked for from one to another that lies near it. */
-const mostOnTheWay = 64;
+/** Among about how many vertices ways are looked for from one to those that lie near it. Beyond, they count as apart. */
+const mostOnTheWay = 1000;
 
 /**
  * How many vertices on open borders lie near others there to which no way leads along edges nearby: the surface looks whole there, and
@@ -86,21 +86,22 @@ export function looseVertices(mesh: Mesh, faces: Uint32Array, { starts, neighbou
   const { diagonal } = boundsOf(positions, faces);
   const near = Math.min(nearDiagonal * diagonal, nearEdge * edge);
   const places = new Places(positions, near, cellShare * diagonal);
-  const isJoined = (vertex: number, other: number) => {
-    const seen = new Set([vertex]);
-    for (const one of seen) {
+  const joinedTo = (vertex: number) => {
+    const joined = new Set([vertex]);
+    for (const one of joined) {
+      if (joined.size > mostOnTheWay) break;
       for (const next of neighbours.subarray(starts[one]!, starts[one + 1]!)) {
-        if (next === other) return true;
-        if (distance(positions, vertex, next) <= 2 * near) seen.add(next);
+        if (distance(positions, vertex, next) <= 2 * near) joined.add(next);
       }
-      if (seen.size > mostOnTheWay) return true; // a border of many vertices in one place
     }
-    return false;
+    return joined;
   };
   const loose = new Set<number>();
   for (const vertex of border) {
     if (places.distances > mostDistances * border.length) break; // that many are near each other
-    for (const other of places.near(vertex)) if (!isJoined(vertex, other)) loose.add(vertex).add(other);
+    const others = places.near(vertex);
+    const joined = others.length > 0 ? joinedTo(vertex) : undefined;
+    for (const other of others) if (!joined!.has(other)) loose.add(vertex).add(other);
     places.add(vertex);
   }
   return loose.size;
