@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "core/energy/cell_pass.h"
 #include "core/multiresolution/coarse_handles.h"
 
 namespace lpdeform {
@@ -122,7 +121,7 @@ bool CoarseLevel::can_lead(const RestShape& fine, double bending) {
 
 std::optional<CoarseMotion> CoarseLevel::lead(const FineInputs& fine, const Points* from,
                                               const Workers& workers, std::stop_token stop) {
-  const Pose before = from ? pose(fine.shape, workers) : rest_pose(fine.shape);
+  const Pose before = from ? pose(fine.shape) : rest_pose(fine.shape);
   if (!restrict_inputs(fine).ok()) return std::nullopt;
   bend_like_fine();
   SolveSettings settings;
@@ -136,7 +135,7 @@ std::optional<CoarseMotion> CoarseLevel::lead(const FineInputs& fine, const Poin
   while (solver_->step()) {
   }
   CoarseMotion motion;
-  motion.positions = carried(from ? *from : fine.shape.scaled_positions(), before, pose(fine.shape, workers),
+  motion.positions = carried(from ? *from : fine.shape.scaled_positions(), before, pose(fine.shape),
                              workers, &motion.turns);
   return motion;
 }
@@ -161,11 +160,8 @@ CoarseLevel::Pose CoarseLevel::rest_pose(const RestShape& fine) const {
   return rest;
 }
 
-CoarseLevel::Pose CoarseLevel::pose(const RestShape& fine, const Workers& workers) const {
-  const Points coarse = (solver_->positions().rowwise() - shape_->centre()) / shape_->mean_edge_length();
-  CellPass cells(shape_, workers);
-  cells.evaluate(coarse, LpNorm(Material::uniform(2), shape_->vertex_count(), 1, 1));
-  return {(solver_->positions().rowwise() - fine.centre()) / fine.mean_edge_length(), cells.rotations()};
+CoarseLevel::Pose CoarseLevel::pose(const RestShape& fine) const {
+  return {(solver_->positions().rowwise() - fine.centre()) / fine.mean_edge_length(), solver_->rotations()};
 }
 
 /// The fine surface `from`, moved as its guides have moved from one coarse state to another. With `turns`, writes them too.
@@ -198,7 +194,7 @@ Points CoarseLevel::carried(const Points& from, const Pose& before, const Pose& 
 }
 
 Points CoarseLevel::prolong(const RestShape& fine, const Workers& workers) const {
-  return carried(fine.scaled_positions(), rest_pose(fine), pose(fine, workers), workers, nullptr);
+  return carried(fine.scaled_positions(), rest_pose(fine), pose(fine), workers, nullptr);
 }
 
 bool CoarseLevel::can_bend_like_fine() const {

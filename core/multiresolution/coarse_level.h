@@ -90,7 +90,7 @@ class CoarseLevel {
   void find_guides(const RestShape& fine);
   absl::Status restrict_inputs(const FineInputs& fine);
   Pose rest_pose(const RestShape& fine) const;
-  Pose pose(const RestShape& fine, const Workers& workers) const;
+  Pose pose(const RestShape& fine) const;
   Points carried(const Points& from, const Pose& before, const Pose& now, const Workers& workers,
                  std::vector<Eigen::Matrix3d>* turns) const;
 

@@ -235,6 +235,17 @@ const Points& Deformer::positions() const {
   return self.positions;
 }
 
+std::vector<Eigen::Matrix3d> Deformer::rotations() {
+  Impl& self = *impl_;
+  if (self.minimiser || self.search || self.certificate) {  // these own the objective's evaluation
+    CellPass cells(self.shape, self.workers());
+    cells.evaluate(self.x, self.even_norm());
+    return cells.rotations();
+  }
+  self.objective.evaluate(self.x, self.even_norm());
+  return self.objective.cells().rotations();
+}
+
 std::size_t Deformer::memory_bytes() const {
   return idle_memory_bytes() + kWorkspace * impl_->x.size() * sizeof(double);
 }

@@ -11,7 +11,8 @@ constexpr double kFarthestGuess = 2;  // the guess continues the last move by le
 constexpr double kSameWay = 0.5;      // two moves count as one drag above this squared cosine between them
 // In such a drag, the squared ratio of the surface's largest move to the handles' largest move is below this.
 constexpr double kSteady = 9;
-constexpr double kMostAbove = 2;  // see is_good
+constexpr double kMostAbove = 2;      // see is_good
+constexpr double kLittleAbove = 1.2;  // see is_as_good_as_before
 
 }  // namespace
 
@@ -64,9 +65,21 @@ std::optional<Points> Deformer::Impl::led_guess() {
 /// Whether a led guess is not much worse than the other one: at p = 2 its E^(1/2) is at most kMostAbove times as high. It may be higher,
 /// because it has kinks that the first iterations take away. At a large p a few kinks would decide.
 bool Deformer::Impl::is_good(const Points& led, const Points& other) {
-  const LpNorm even(Material::uniform(2), shape->vertex_count(), unit(), 1);
-  const double most = kMostAbove * kMostAbove * objective.evaluate(other, even);
-  return objective.evaluate(led, even) <= most;
+  const double most = kMostAbove * kMostAbove * objective.evaluate(other, even_norm());
+  return objective.evaluate(led, even_norm()) <= most;
+}
+
+/// The same without another guess: its E^(1/2) at p = 2 is at most kLittleAbove times as high as that of the state before the move.
+bool Deformer::Impl::is_as_good_as_before(const Points& led) {
+  if (!constraints->soft.empty()) return false;  // the state before has no such terms for the new targets
+  const double most = kLittleAbove * kLittleAbove * best_energies.squaredNorm();
+  return objective.evaluate(led, even_norm()) * unit() * unit() <= most;
+}
+
+/// Begins with a led guess. If some p_i > 2, the weights of the move before differ so much that a step in their metric is cut short.
+Points Deformer::Impl::go_with(Points led) {
+  if (material.p.maxCoeff() > 2) warmth = Warmth::kWarm;
+  return led;
 }
 
 /// Lets the coarse level, where there is one, follow to `guess`, so that it can lead from the next move on.
@@ -98,6 +111,7 @@ Points Deformer::Impl::current_guess() {
   }
   const bool can_lead = warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, bending);
   std::optional<Points> led = can_lead ? led_guess() : std::nullopt;
+  if (led && is_as_good_as_before(*led)) return go_with(*std::move(led));
   const double share = size > 0 ? along / size : 0;
   const bool goes_on = share > 0 && share < kFarthestGuess && along * along > kSameWay * size * left &&
                        last.rowwise().squaredNorm().maxCoeff() < kSteady * longest;
@@ -111,11 +125,7 @@ Points Deformer::Impl::current_guess() {
   if (goes_on) u += share * last;
   Points guess = x + u;
   if (!can_lead || !guess.allFinite()) return guess;
-  if (led && is_good(*led, guess)) {
-    // If some p_i > 2, the weights of the move before differ so much that a step in their metric is cut short.
-    if (material.p.maxCoeff() > 2) warmth = Warmth::kWarm;
-    return *std::move(led);
-  }
+  if (led && is_good(*led, guess)) return go_with(*std::move(led));
   follow(guess);
   return guess;
 }

@@ -14,7 +14,6 @@
 namespace lpdeform {
 namespace {
 
-constexpr int kMostTogether = 12;            // fine iterations after which the coarse level does not lead on
 constexpr double kCertificateSeconds = 1;    // it may take this long, even beyond the time limit
 constexpr std::size_t kCopyChunk = 4096;     // vertices
 constexpr std::int32_t kLargeAtTwo = 10000;  // the same if every p is 2, where the gain is smaller
@@ -46,6 +45,7 @@ class DeformerOfLevel : public LevelSolver {
     return !summary.minima.empty() && summary.energy < summary.minima.front();
   }
   const Points& positions() const override { return deformer_->positions(); }
+  std::vector<Eigen::Matrix3d> rotations() override { return deformer_->rotations(); }
   std::size_t memory_bytes() const override { return deformer_->idle_memory_bytes(); }
 
  private:
@@ -58,9 +58,14 @@ double Deformer::Impl::seconds() const {
   return std::chrono::duration<double>(Clock::now() - started).count();
 }
 
+/// The norm whose sum is that of the E_i^2 and D_k^2, in scaled units.
+LpNorm Deformer::Impl::even_norm() const {
+  return {Material::uniform(2), shape->vertex_count(), unit(), 1};
+}
+
 /// The largest E_i or D_k at the guess. As the reference length, it keeps terms of any p in range.
 double Deformer::Impl::typical_energy(const Points& guess) {
-  objective.evaluate(guess, LpNorm(Material::uniform(2), shape->vertex_count(), unit(), 1));
+  objective.evaluate(guess, even_norm());
   const auto& e2 = objective.cells().squared_energies();
   const auto& d2 = objective.soft_terms().squared_distances();
   double largest = *std::max_element(e2.begin(), e2.end());
@@ -305,7 +310,6 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   norm.emplace(effective_material(), shape->vertex_count(), unit(), reference);
   objective.reweigh(*norm);  // typical_energy has evaluated the guess
   best_sum = std::numeric_limits<double>::infinity();
-  fine_iterations = 0;
   minimiser = make_minimiser(settings.method, std::move(guess), warmth);
   factor = settings.method == Method::kQuasiNewton ? Factor::kQuasiNewton : Factor::kUsable;
   const double sum = objective.sum(*norm);
@@ -320,12 +324,7 @@ void Deformer::Impl::iterate() {
   if (search) return search_on();
   const StepResult result = minimiser->step();
   const bool is_ahead = settings.method == Method::kMultiresolution && result.stage == 0;
-  if (!is_ahead) ++fine_iterations;
-  // After many iterations x has settled and the coarse level has not. At the next move it would take x the same way again.
-  if (fine_iterations > kMostTogether && !is_coarse())
-    lead = Lead::kNone;
-  else if (settings.method == Method::kMultiresolution)
-    lead = is_ahead ? Lead::kAhead : Lead::kTogether;
+  if (settings.method == Method::kMultiresolution) lead = is_ahead ? Lead::kAhead : Lead::kTogether;
   double sum = result.true_sum ? *result.true_sum : objective.sum(*norm);
   keep_if_best(sum);
   const bool is_over = result.outcome == Outcome::kConverged || result.outcome == Outcome::kStalled;

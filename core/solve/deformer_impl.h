@@ -40,9 +40,12 @@ struct Deformer::Impl {
   std::optional<Points> led_guess();
   void follow(const Points& guess);
   bool is_good(const Points& led, const Points& other);
+  bool is_as_good_as_before(const Points& led);
+  Points go_with(Points led);
   FineInputs coarse_inputs(const Material& effective) const;
   SoftTerms guess_springs() const;
   Points initial_guess(InitialGuess guess);
+  LpNorm even_norm() const;
   double typical_energy(const Points& guess);
   double rounding() const;
   double zero_objective() const;
@@ -152,7 +155,6 @@ struct Deformer::Impl {
     kTogether,  // it is for the same inputs, and has come as far as x
   };
   Lead lead = Lead::kNone;
-  int fine_iterations = 0;  // of the running solve
   std::unique_ptr<Minimiser> minimiser;
   std::unique_ptr<MinimaSearch> search;      // runs after the minimiser has ended
   bool is_search_apart = false;              // its result goes to `better`, not to x
