@@ -31,6 +31,7 @@ class Reader {
     for (const std::size_t node : tree_.in_scene) {
       if (value_of(item(root_, "nodes", node), "mesh") != nullptr) read_node(node);
     }
+    check_compressions(document_);
     if (corners_.empty()) refuse("the scene", "has no triangles that could be deformed");
     list_.mesh.faces =
         Eigen::Map<const Faces>(corners_.data(), static_cast<Eigen::Index>(corners_.size() / 3), 3);

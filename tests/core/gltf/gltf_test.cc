@@ -269,6 +269,13 @@ TEST(Gltf, RefusalsNameThePart) {
        unsupported, "bufferView 2"},
       {[](MadeGltf& m) { m.root["extensionsRequired"] = {"ACME_secret"}; }, unsupported,
        "the extension ACME_secret"},
+      {[](MadeGltf& m) { m.root["extensionsRequired"] = {"KHR_draco_mesh_compression"}; }, unsupported,
+       "the extension KHR_draco_mesh_compression"},
+      {[](MadeGltf& m) { m.root["extensionsRequired"] = {"EXT_meshopt_compression"}; }, unsupported,
+       "the extension EXT_meshopt_compression"},
+      {[](MadeGltf& m) { m.root["extensionsRequired"] = "KHR_draco_mesh_compression"; }, syntax,
+       "\"extensionsRequired\""},
+      {[](MadeGltf& m) { m.root["extensionsRequired"] = {7}; }, syntax, "\"extensionsRequired\""},
       {[](MadeGltf& m) {
          m.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"] = {{"attributes", {}}};
        },

@@ -124,6 +124,22 @@ describe("a GLB file", () => {
     ["BufferView 1 is compressed by EXT_meshopt", (json) => (json.bufferViews[1].extensions = { EXT_meshopt_compression: {} })],
     ["The extension ACME_secret is required", (json) => (json.extensionsRequired = ["ACME_secret"])],
     [
+      "The extension KHR_draco_mesh_compression is required",
+      (json) => (json.extensionsRequired = ["KHR_texture_basisu", "KHR_draco_mesh_compression"]),
+    ],
+    ["The extension EXT_meshopt_compression is required", (json) => (json.extensionsRequired = ["EXT_meshopt_compression"])],
+    ["The extension ACME_draco is required", (json) => (json.extensionsRequired = ["ACME_draco"])],
+    [
+      "Primitive 0 of mesh 0 (“sheet”) is compressed by KHR_draco",
+      (json) => {
+        json.extensionsRequired = ["KHR_draco_mesh_compression"];
+        json.meshes[0].primitives[0].extensions = { KHR_draco_mesh_compression: {} };
+      },
+    ],
+    ["“extensionsRequired” is no list", (json) => (json.extensionsRequired = "KHR_draco_mesh_compression")],
+    ["“extensionsRequired” is no list", (json) => (json.extensionsRequired = {})],
+    ["“extensionsRequired” has an item that is no text", (json) => (json.extensionsRequired = [null])],
+    [
       "Node 0 (“tube”) draws by EXT_mesh_gpu_instancing",
       (json) => (json.nodes[0].extensions = { EXT_mesh_gpu_instancing: {} }),
     ],
@@ -148,6 +164,26 @@ describe("a GLB file", () => {
   ])("is refused with a sentence that begins: %s", (words, change) => {
     expect(() => parseMesh("a.glb", with_(change))).toThrow(FileFault);
     expect(() => parseMesh("a.glb", with_(change))).toThrow(words);
+  });
+
+  it("says once which points, lines and flattened nodes stay as they are, and keeps them", () => {
+    const other = with_((json) => {
+      const { primitives } = json.meshes[0]; // two nodes draw it
+      primitives.push({ ...primitives[0], mode: 0 }, { ...primitives[0], mode: 1 }, { attributes: {} });
+      json.nodes.push({ mesh: 1, name: "flat", scale: [1, 0, 1] });
+      json.scenes[0].nodes.push(json.nodes.length - 1);
+    });
+    const mesh = meshOf(other);
+    expect(mesh.notices).toEqual([
+      "The points of primitive 1 of mesh 0 (“sheet”) stay as they are.",
+      "The lines of primitive 2 of mesh 0 (“sheet”) stay as they are.",
+      "There are no positions in primitive 3 of mesh 0 (“sheet”): it stays as it is.",
+      "What node 4 (“flat”) draws is flattened by its scale, and stays as it is.",
+    ]);
+    expect(mesh.faces).toEqual(meshOf(glb).faces);
+    expect(meshOf(glb).notices).toBeUndefined();
+    const { json } = documentOf(rewriteGlb(mesh, turned(mesh))) as { json: any };
+    expect(json.meshes[0].primitives.map(({ mode }: any) => mode)).toEqual([undefined, 0, 1, undefined]);
   });
 
   it("whose chunk of JSON is longer than the file is refused by the chunk", () => {
