@@ -191,6 +191,14 @@ it("a file of strips with more triangles than a page can handle is refused", asy
   );
 }, 60_000);
 
+it("a geometry that stands in faces of another one is no part of the file", async () => {
+  const inner = /<geometry[^]*<\/geometry>/.exec(faces(element("trifans", 1, "<p>0 1 2</p>")))![0];
+  const all = faces(
+    element("trifans", cells.length, lists(cells) + inner.replaceAll('id="', 'id="inner-').replaceAll("#", "#inner-")),
+  );
+  expect(shapesOf(await meshOf(all))).toEqual(shapesOf(await meshOf(dae)));
+});
+
 /** Sources of normals, texture coordinates and colours, one for each of the first four vertices, and a second material. */
 function rich(elements: string): string {
   const source = (id: string, stride: number, numbers: readonly number[]) => `<source id="${id}">
