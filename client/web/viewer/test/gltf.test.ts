@@ -158,6 +158,7 @@ describe("a GLB file", () => {
       "The scene has no triangles that could be deformed, only points and lines",
       (json) => json.meshes.forEach((mesh: any) => (mesh.primitives[0].mode = 1)),
     ],
+    ["Primitive 0 of mesh 0 (“sheet”) has a “mode” that", (json) => (json.meshes[0].primitives[0].mode = "4")],
     ["Node 0 (“tube”) is reached twice", (json) => (json.nodes[0].children = [0])],
     ["Node 0 (“tube”) names none of the 2 meshes", (json) => (json.nodes[0].mesh = 7)],
     ["a.glb is no glTF of version 2", (json) => (json.asset.version = "1.0")],
@@ -184,6 +185,27 @@ describe("a GLB file", () => {
     expect(meshOf(glb).notices).toBeUndefined();
     const { json } = documentOf(rewriteGlb(mesh, turned(mesh))) as { json: any };
     expect(json.meshes[0].primitives.map(({ mode }: any) => mode)).toEqual([undefined, 0, 1, undefined]);
+  });
+
+  it("says which corners make no triangle", () => {
+    const plain = meshOf(makeGlb(true));
+    const other = with_((json) => {
+      const { primitives } = json.meshes[0];
+      const shorter = (mode: number, count: number) => {
+        const indices = json.accessors.push({ ...json.accessors[primitives[0].indices], count }) - 1;
+        primitives.push({ ...primitives[0], mode, indices });
+      };
+      shorter(4, 5);
+      shorter(5, 2);
+      shorter(6, 1);
+      shorter(5, 3);
+    }, makeGlb(true));
+    expect(meshOf(other).faces.length / 3).toBe(plain.faces.length / 3 + 2);
+    expect(meshOf(other).notices).toEqual([
+      "Corners at the end of primitive 1 of mesh 0 make no triangle: 2 of 5.",
+      "Corners at the end of primitive 2 of mesh 0 make no triangle: 2 of 2.",
+      "Corners at the end of primitive 3 of mesh 0 make no triangle: 1 of 1.",
+    ]);
   });
 
   it("whose chunk of JSON is longer than the file is refused by the chunk", () => {

@@ -1,6 +1,6 @@
 import { mat4, quat, type vec3 } from "gl-matrix";
 import { countOf, readNumbers } from "./gltf_accessors.js";
-import { type GltfDocument, indexOf, listOf, nameOf, type Part, partOf, refuse } from "./gltf_document.js";
+import { type GltfDocument, indexOf, listOf, nameOf, type Part, partOf, refuse, wholeOf } from "./gltf_document.js";
 
 /** Sixteen doubles, column by column. */
 export type Placement = number[];
@@ -178,7 +178,7 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Plac
     if (partOf(primitive["extensions"])["KHR_draco_mesh_compression"]) {
       refuse(part, "is compressed by KHR_draco_mesh_compression, which is not read");
     }
-    const mode = (primitive["mode"] ?? triangles) as number;
+    const mode = wholeOf(primitive, "mode", triangles, part);
     const attributes = partOf(primitive["attributes"]);
     const accessor = (key: string) =>
       attributes[key] === undefined ? undefined : indexOf(json, attributes[key], "accessors", part);
@@ -209,7 +209,11 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Plac
       if (list.vertexCount > most) refuse("the scene", `has more than ${most} vertices, which this page takes at most`);
     }
     const firstFace = list.faces.length / 3;
-    addTriangles(cornersOf(document, primitive, block.count, part), mode, block, list);
+    const corners = cornersOf(document, primitive, block.count, part);
+    addTriangles(corners, mode, block, list);
+    const { length } = corners;
+    const rest = mode === triangles ? length % 3 : length < 3 ? length : 0;
+    if (rest > 0) list.notices.add(`Corners at the end of ${part} make no triangle: ${rest} of ${length}.`);
     list.parts.push({ block, primitive: k, firstFace, faceCount: list.faces.length / 3 - firstFace });
   });
   list.blocks.push(...own);
