@@ -121,7 +121,10 @@ function addStrip(
 function trianglesOf(faces: Faces, corners: readonly number[], kept: Set<string>, none: string | undefined): string {
   const { element, inputs, stride, indices } = faces;
   const material = element.attributes["material"] || none;
-  const numbers = corners.map((corner) => indices.slice(corner * stride, (corner + 1) * stride).join(" "));
+  let numbers = "";
+  for (const corner of corners) {
+    for (let k = corner * stride; k < (corner + 1) * stride; ++k) numbers += `${indices[k]} `;
+  }
   const all = inputs.map((input) => {
     const { semantic = "", source = "", set } = input.element.attributes;
     const isRead = isVertex(input.element) || kept.has(keyOf(input));
@@ -129,7 +132,7 @@ function trianglesOf(faces: Faces, corners: readonly number[], kept: Set<string>
     return `<input${own.join("")} offset="${input.offset}"${set === undefined ? "" : attributeOf("set", set)}/>`;
   });
   const begin = `<triangles count="${corners.length / 3}"${material === undefined ? "" : attributeOf("material", material)}>`;
-  return `${begin}${all.join("")}<p>${numbers.join(" ")}</p></triangles>`;
+  return `${begin}${all.join("")}<p>${numbers}</p></triangles>`;
 }
 
 const attributeOf = (name: string, value: string) =>

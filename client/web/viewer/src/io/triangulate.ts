@@ -6,9 +6,10 @@ import { ShapeUtils, Vector2 } from "three";
  * a hole does not lie within the outline, or crosses it or another hole. An outline that crosses itself becomes a fan.
  */
 export function triangulated(points: readonly number[], rings: readonly number[]): number[] | undefined {
-  const flat = flattened(points, rings[0]!);
   const hasHoles = rings.length > 1;
   if (!hasHoles && rings[0] === 3) return [0, 1, 2];
+  if (!hasHoles && rings[0] === 4 && isParted(points)) return usual;
+  const flat = flattened(points, rings[0]!);
   if (!hasHoles && rings[0] === 4) return quad(flat);
   const found = flat && clipped(flat, rings);
   return found ?? (hasHoles ? undefined : fan(rings[0]!));
@@ -47,9 +48,24 @@ const turn = (a: Vector2, b: Vector2, c: Vector2) => (b.x - a.x) * (c.y - a.y) -
 
 const fan = (count: number) => Array.from({ length: count - 2 }, (_, k) => [0, k + 1, k + 2]).flat();
 
-/** Parted along the diagonal between its corners 1 and 3, unless that one alone lies outside. */
+/** Four corners, parted along the diagonal between 1 and 3. */
+const usual = [0, 1, 3, 1, 2, 3];
+
+/** Whether the two triangles of the usual diagonal turn alike. Most quads end here: files may have a million of them. */
+function isParted(points: readonly number[]): boolean {
+  const along = (from: number, to: number, axis: number) => points[3 * to + axis]! - points[3 * from + axis]!;
+  let sum = 0;
+  for (let axis = 0; axis < 3; ++axis) {
+    const [i, j] = [(axis + 1) % 3, (axis + 2) % 3];
+    const first = along(0, 1, i) * along(0, 3, j) - along(0, 1, j) * along(0, 3, i);
+    const second = along(1, 2, i) * along(1, 3, j) - along(1, 2, j) * along(1, 3, i);
+    sum += first * second;
+  }
+  return sum > 0;
+}
+
+/** Parted along the usual diagonal, unless the other one alone lies inside. */
 function quad(flat: readonly Vector2[] | undefined): number[] {
-  const usual = [0, 1, 3, 1, 2, 3];
   const other = [0, 1, 2, 0, 2, 3];
   const isInside = (way: readonly number[]) =>
     [0, 3].every((k) => turn(flat![way[k]!]!, flat![way[k + 1]!]!, flat![way[k + 2]!]!) > 0);
