@@ -32,14 +32,17 @@ bool is_harmless(std::string_view extension) {
       kParts, [&](std::string_view part) { return extension.find(part) != std::string_view::npos; });
 }
 
-void check_extensions(const Json& root) {
+bool is_compression(std::string_view extension) {
+  return extension == "KHR_draco_mesh_compression" || extension.ends_with("_meshopt_compression");
+}
+
+/// Of those that are required: the compressions, or all others.
+void check_extensions(const Json& root, bool of_compression) {
   for (std::size_t k = 0; k < count_of(root, "extensionsRequired"); ++k) {
     const Json& name = root["extensionsRequired"][k];
     if (!name.is_string()) refuse("\"extensionsRequired\"", "has an item that is no text");
     const auto& text = name.get_ref<const std::string&>();
-    const bool has_own_message =
-        text == "KHR_draco_mesh_compression" || text.ends_with("_meshopt_compression");
-    if (!is_harmless(text) && !has_own_message)
+    if (is_compression(text) == of_compression && !is_harmless(text))
       refuse_unsupported(absl::StrCat("the extension ", printable(text)),
                          "is required by the file and not known here");
   }
@@ -128,11 +131,15 @@ std::optional<std::filesystem::path> image_file(const Json& image, const std::fi
   return file_within(folder, uri->get_ref<const std::string&>());
 }
 
+void check_compressions(const Document& document) {
+  check_extensions(document.root, true);
+}
+
 Document parse_document(std::string_view bytes, const std::filesystem::path& folder) {
   Container container = parse_container(bytes);
   Document document{parse_json(container.json), {}, std::move(container.others), whole_path(folder), {}};
   check_version(document.root);
-  check_extensions(document.root);
+  check_extensions(document.root, false);
   check_views(document.root);
   check_lengths(document.root);
   for (std::size_t k = 0; k < count_of(document.root, "buffers"); ++k)

@@ -27,6 +27,10 @@ struct Document {
 /// file outside of `folder`, buffers of more than 4 GiB together.
 Document parse_document(std::string_view bytes, const std::filesystem::path& folder);
 
+/// Throws a Refusal if the file requires a compression of geometry. It is for the end: what the scene draws is refused before, by the
+/// part that is compressed.
+void check_compressions(const Document& document);
+
 /// The file within `folder` that the image names, which may not be there.
 std::optional<std::filesystem::path> image_file(const Json& image, const std::filesystem::path& folder);
 

@@ -31,6 +31,7 @@ class Reader {
     for (const std::size_t node : tree_.in_scene) {
       if (value_of(item(root_, "nodes", node), "mesh") != nullptr) read_node(node);
     }
+    check_compressions(document_);
     if (corners_.empty()) refuse("the scene", "has no triangles that could be deformed");
     list_.mesh.faces =
         Eigen::Map<const Faces>(corners_.data(), static_cast<Eigen::Index>(corners_.size() / 3), 3);
@@ -78,7 +79,7 @@ class Reader {
       refuse_unsupported(part, "is compressed by KHR_draco_mesh_compression, which is not read");
     const std::uint64_t mode = whole(primitive, "mode", kTriangles, part);
     if (mode != kTriangles && mode != kStrip && mode != kFan) {
-      notice_once(block,
+      notice_once(block.mesh, block.primitives[0],
                   absl::StrCat("The ", mode == 0 ? "points" : "lines", " of ", part, " stay as they are."));
       return;
     }
@@ -86,22 +87,31 @@ class Reader {
     const auto position =
         attributes != nullptr ? attribute(root_, *attributes, "POSITION", part) : std::nullopt;
     if (!position) {
-      notice_once(block, absl::StrCat("There are no positions in ", part, ": it stays as it is."));
+      notice_once(block.mesh, block.primitives[0],
+                  absl::StrCat("There are no positions in ", part, ": it stays as it is."));
       return;
     }
     block.attributes = {*position, attribute(root_, *attributes, "NORMAL", part),
                         attribute(root_, *attributes, "TANGENT", part)};
-    const std::size_t number = block.primitives[0], own = add_block(std::move(block), part);
+    const std::size_t mesh = block.mesh, number = block.primitives[0],
+                      own = add_block(std::move(block), part);
     const auto first_face = static_cast<Eigen::Index>(corners_.size() / 3);
-    add_triangles(corner_list(primitive, static_cast<std::uint64_t>(list_.blocks[own].count), part), mode,
-                  list_.blocks[own]);
+    const auto corners = corner_list(primitive, static_cast<std::uint64_t>(list_.blocks[own].count), part);
+    add_triangles(corners, mode, list_.blocks[own]);
+    const std::size_t rest = mode == kTriangles   ? corners.size() % 3
+                             : corners.size() < 3 ? corners.size()
+                                                  : 0;
+    if (rest > 0)
+      notice_once(mesh, number,
+                  absl::StrCat("Corners at the end of ", part, " make no triangle: ", rest, " of ",
+                               corners.size(), "."));
     list_.ranges.push_back(
         {own, number, first_face, static_cast<Eigen::Index>(corners_.size() / 3) - first_face});
   }
 
-  /// However many nodes draw the block's primitive.
-  void notice_once(const Block& block, std::string notice) {
-    if (noticed_.insert({block.mesh, block.primitives[0]}).second) list_.notices.push_back(std::move(notice));
+  /// However many nodes draw the primitive.
+  void notice_once(std::size_t mesh, std::size_t primitive, std::string notice) {
+    if (noticed_.insert({mesh, primitive}).second) list_.notices.push_back(std::move(notice));
   }
 
   std::size_t add_block(Block block, const std::string& part) {

@@ -245,6 +245,11 @@ def damaged(change: Callable[[Document], object]) -> bytes:
         (damaged(lambda d: d["nodes"][0].update(children=[0])), "MESH_SYNTAX", "the nodes"),
         (damaged(lambda d: d.update(extensionsRequired=["ACME_secret"])), "MESH_UNSUPPORTED", "the extension ACME_secret"),
         (
+            damaged(lambda d: d.update(extensionsRequired=["KHR_draco_mesh_compression"])),
+            "MESH_UNSUPPORTED",
+            "the extension KHR_draco_mesh_compression",
+        ),
+        (
             damaged(lambda d: d["bufferViews"][0].update(extensions={"EXT_meshopt_compression": {}})),
             "MESH_UNSUPPORTED",
             "bufferView 0",
@@ -259,7 +264,7 @@ def damaged(change: Callable[[Document], object]) -> bytes:
             "accessor 0",
         ),
     ],
-    ids=["cut off", "too many", "offset", "no accessor", "circle", "extension", "compressed", "sparse"],
+    ids=["cut off", "too many", "offset", "no accessor", "circle", "extension", "unused compression", "compressed", "sparse"],
 )
 def test_a_broken_file_is_refused_by_its_part(tmp_path: Path, data: bytes, reason: str, element: str) -> None:
     path = tmp_path / "broken.glb"

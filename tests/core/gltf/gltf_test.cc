@@ -254,6 +254,27 @@ TEST(Gltf, LinesStayAsTheyAreAndAreNamed) {
               ElementsAre("The lines of primitive 1 of mesh 0 stay as they are."));
 }
 
+TEST(Gltf, CornersThatMakeNoTriangleAreNamed) {
+  MadeGltf made = square();
+  const ordered_json whole = made.root["meshes"][0]["primitives"][0];
+  const auto add = [&](int mode, const std::vector<std::uint16_t>& corners) {
+    ordered_json other = whole;
+    other["mode"] = mode;
+    other["indices"] = made.indices(corners);
+    made.root["meshes"][0]["primitives"].push_back(other);
+  };
+  add(4, {0, 1, 2, 0, 1});
+  add(5, {0, 1});
+  add(6, {0});
+  add(5, {0, 1, 2, 3});
+  const Gltf file = parsed(made.glb());
+  EXPECT_EQ(file.mesh().faces.rows(), parsed(square().glb()).mesh().faces.rows() + 3);
+  EXPECT_THAT(file.notices(),
+              ElementsAre("Corners at the end of primitive 1 of mesh 0 make no triangle: 2 of 5.",
+                          "Corners at the end of primitive 2 of mesh 0 make no triangle: 2 of 2.",
+                          "Corners at the end of primitive 3 of mesh 0 make no triangle: 1 of 1."));
+}
+
 TEST(Gltf, RefusalsNameThePart) {
   const std::string syntax = "MESH_SYNTAX", unsupported = "MESH_UNSUPPORTED";
   using Change = void (*)(MadeGltf&);
@@ -269,6 +290,13 @@ TEST(Gltf, RefusalsNameThePart) {
        unsupported, "bufferView 2"},
       {[](MadeGltf& m) { m.root["extensionsRequired"] = {"ACME_secret"}; }, unsupported,
        "the extension ACME_secret"},
+      {[](MadeGltf& m) { m.root["extensionsRequired"] = {"KHR_draco_mesh_compression"}; }, unsupported,
+       "the extension KHR_draco_mesh_compression"},
+      {[](MadeGltf& m) { m.root["extensionsRequired"] = {"EXT_meshopt_compression"}; }, unsupported,
+       "the extension EXT_meshopt_compression"},
+      {[](MadeGltf& m) { m.root["extensionsRequired"] = "KHR_draco_mesh_compression"; }, syntax,
+       "\"extensionsRequired\""},
+      {[](MadeGltf& m) { m.root["extensionsRequired"] = {7}; }, syntax, "\"extensionsRequired\""},
       {[](MadeGltf& m) {
          m.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"] = {{"attributes", {}}};
        },

@@ -124,6 +124,22 @@ describe("a GLB file", () => {
     ["BufferView 1 is compressed by EXT_meshopt", (json) => (json.bufferViews[1].extensions = { EXT_meshopt_compression: {} })],
     ["The extension ACME_secret is required", (json) => (json.extensionsRequired = ["ACME_secret"])],
     [
+      "The extension KHR_draco_mesh_compression is required",
+      (json) => (json.extensionsRequired = ["KHR_texture_basisu", "KHR_draco_mesh_compression"]),
+    ],
+    ["The extension EXT_meshopt_compression is required", (json) => (json.extensionsRequired = ["EXT_meshopt_compression"])],
+    ["The extension ACME_draco is required", (json) => (json.extensionsRequired = ["ACME_draco"])],
+    [
+      "Primitive 0 of mesh 0 (“sheet”) is compressed by KHR_draco",
+      (json) => {
+        json.extensionsRequired = ["KHR_draco_mesh_compression"];
+        json.meshes[0].primitives[0].extensions = { KHR_draco_mesh_compression: {} };
+      },
+    ],
+    ["“extensionsRequired” is no list", (json) => (json.extensionsRequired = "KHR_draco_mesh_compression")],
+    ["“extensionsRequired” is no list", (json) => (json.extensionsRequired = {})],
+    ["“extensionsRequired” has an item that is no text", (json) => (json.extensionsRequired = [null])],
+    [
       "Node 0 (“tube”) draws by EXT_mesh_gpu_instancing",
       (json) => (json.nodes[0].extensions = { EXT_mesh_gpu_instancing: {} }),
     ],
@@ -142,12 +158,54 @@ describe("a GLB file", () => {
       "The scene has no triangles that could be deformed, only points and lines",
       (json) => json.meshes.forEach((mesh: any) => (mesh.primitives[0].mode = 1)),
     ],
+    ["Primitive 0 of mesh 0 (“sheet”) has a “mode” that", (json) => (json.meshes[0].primitives[0].mode = "4")],
     ["Node 0 (“tube”) is reached twice", (json) => (json.nodes[0].children = [0])],
     ["Node 0 (“tube”) names none of the 2 meshes", (json) => (json.nodes[0].mesh = 7)],
     ["a.glb is no glTF of version 2", (json) => (json.asset.version = "1.0")],
   ])("is refused with a sentence that begins: %s", (words, change) => {
     expect(() => parseMesh("a.glb", with_(change))).toThrow(FileFault);
     expect(() => parseMesh("a.glb", with_(change))).toThrow(words);
+  });
+
+  it("says once which points, lines and flattened nodes stay as they are, and keeps them", () => {
+    const other = with_((json) => {
+      const { primitives } = json.meshes[0]; // two nodes draw it
+      primitives.push({ ...primitives[0], mode: 0 }, { ...primitives[0], mode: 1 }, { attributes: {} });
+      json.nodes.push({ mesh: 1, name: "flat", scale: [1, 0, 1] });
+      json.scenes[0].nodes.push(json.nodes.length - 1);
+    });
+    const mesh = meshOf(other);
+    expect(mesh.notices).toEqual([
+      "The points of primitive 1 of mesh 0 (“sheet”) stay as they are.",
+      "The lines of primitive 2 of mesh 0 (“sheet”) stay as they are.",
+      "There are no positions in primitive 3 of mesh 0 (“sheet”): it stays as it is.",
+      "What node 4 (“flat”) draws is flattened by its scale, and stays as it is.",
+    ]);
+    expect(mesh.faces).toEqual(meshOf(glb).faces);
+    expect(meshOf(glb).notices).toBeUndefined();
+    const { json } = documentOf(rewriteGlb(mesh, turned(mesh))) as { json: any };
+    expect(json.meshes[0].primitives.map(({ mode }: any) => mode)).toEqual([undefined, 0, 1, undefined]);
+  });
+
+  it("says which corners make no triangle", () => {
+    const plain = meshOf(makeGlb(true));
+    const other = with_((json) => {
+      const { primitives } = json.meshes[0];
+      const shorter = (mode: number, count: number) => {
+        const indices = json.accessors.push({ ...json.accessors[primitives[0].indices], count }) - 1;
+        primitives.push({ ...primitives[0], mode, indices });
+      };
+      shorter(4, 5);
+      shorter(5, 2);
+      shorter(6, 1);
+      shorter(5, 3);
+    }, makeGlb(true));
+    expect(meshOf(other).faces.length / 3).toBe(plain.faces.length / 3 + 2);
+    expect(meshOf(other).notices).toEqual([
+      "Corners at the end of primitive 1 of mesh 0 make no triangle: 2 of 5.",
+      "Corners at the end of primitive 2 of mesh 0 make no triangle: 2 of 2.",
+      "Corners at the end of primitive 3 of mesh 0 make no triangle: 1 of 1.",
+    ]);
   });
 
   it("whose chunk of JSON is longer than the file is refused by the chunk", () => {

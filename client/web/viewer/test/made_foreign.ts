@@ -56,6 +56,37 @@ export function makeDae({ points, triangles } = small): string {
 </COLLADA>`;
 }
 
+/** The same with a DOCTYPE and prefixes, and the tube in strips, fans and polygons. */
+export function makeOddDae(): string {
+  const cell = (k: number) => {
+    const row = Math.floor(k / columns) * columns;
+    const [a, b] = [row + (k % columns), row + ((k + 1) % columns)];
+    return [a, b, b + columns, a + columns];
+  };
+  const cells = Array.from({ length: rows * columns }, (_, k) => cell(k));
+  const third = Math.floor(cells.length / 3);
+  const lists = (all: readonly (readonly (number | undefined)[])[]) => all.map((one) => `<p>${one.join(" ")}</p>`).join("");
+  const element = (name: string, all: readonly string[]) =>
+    `<${name} count="${all.length}" material="red"><input semantic="VERTEX" source="#vertices" offset="0"/>${all.join("")}</${name}>`;
+  const elements = [
+    element(
+      "tristrips",
+      cells.slice(0, third).map(([a, b, c, d]) => lists([[d, a, c, b]])),
+    ),
+    element(
+      "trifans",
+      cells.slice(third, 2 * third).map((one) => lists([one])),
+    ),
+    element(
+      "polygons",
+      cells.slice(2 * third).map((one) => `<ph>${lists([one])}</ph>`),
+    ),
+  ].join("\n    ");
+  const text = makeDae().replace(/<triangles[^]*<\/triangles>/, elements);
+  const prefixed = text.replace(/<(\/?)(\w)/g, "<$1c:$2").replace(" xmlns=", " xmlns:c=");
+  return prefixed.replace("?>\n", '?>\n<!DOCTYPE c:COLLADA SYSTEM "collada.dtd" [ <!ELEMENT a ANY> ]>\n');
+}
+
 /** FBX 7.4 as text, with y up: z of the tube is y of the file. */
 export function makeFbx({ points, triangles } = small): string {
   const places = points.flatMap(([x, y, z]) => [x, z, -y!]);

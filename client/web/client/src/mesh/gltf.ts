@@ -11,7 +11,7 @@ import { listOf, readGltfDocument, writeGlb } from "./gltf_document.js";
  */
 export function readGltf(name: string, bytes: Uint8Array, beside: ReadonlyMap<string, Uint8Array> = new Map()): Mesh {
   const document = readGltfDocument(name, bytes, beside);
-  const { blocks, faces, left } = readBlocks(document);
+  const { blocks, faces, left, notices } = readBlocks(document);
   const builder = new MeshBuilder();
   const place: [number, number, number] = [0, 0, 0];
   for (const { position, placement, node } of blocks) {
@@ -34,5 +34,5 @@ export function readGltf(name: string, bytes: Uint8Array, beside: ReadonlyMap<st
   if (attributes.some((text) => text.includes("TEXCOORD_0"))) builder.leftAside("texture coordinates");
   if (attributes.some((text) => text.includes('"targets"'))) builder.leftAside("morph targets");
   for (const what of left) builder.leftAside(what);
-  return { ...builder.finish(name), gltf: writeGlb(document) };
+  return { ...builder.finish(name), ...(notices.size > 0 && { notices: [...notices] }), gltf: writeGlb(document) };
 }

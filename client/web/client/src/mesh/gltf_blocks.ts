@@ -1,6 +1,6 @@
 import { mat4, quat, type vec3 } from "gl-matrix";
 import { countOf, readNumbers } from "./gltf_accessors.js";
-import { type GltfDocument, indexOf, listOf, nameOf, type Part, partOf, refuse } from "./gltf_document.js";
+import { type GltfDocument, indexOf, listOf, nameOf, type Part, partOf, refuse, wholeOf } from "./gltf_document.js";
 
 /** Sixteen doubles, column by column. */
 export type Placement = number[];
@@ -30,6 +30,8 @@ export interface DrawList {
   parts: DrawPart[];
   /** What is drawn otherwise, in words. */
   left: Set<string>;
+  /** The same part by part, a sentence each. */
+  notices: Set<string>;
 }
 
 /** The faces of one primitive. */
@@ -47,25 +49,39 @@ const most = 5_000_000;
 /** As the command line reads it (core/gltf/gltf.h). Throws a FileFault that names the part. */
 export function readBlocks(document: GltfDocument): DrawList {
   const { json } = document;
-  for (const name of (json["extensionsRequired"] ?? []) as unknown[]) {
-    if (
-      !/_materials_|_texture_|_lights_|_animation_|_audio|_xmp|KHR_mesh_quantization|draco|meshopt/.test(String(name))
-    ) {
-      refuse(`the extension ${String(name)}`, "is required by the file and not known here");
-    }
-  }
+  const required = requiredOf(json);
+  checkExtensions(required.filter((name) => !isCompression(name)));
   listOf(json, "bufferViews").forEach((view, k) => {
     const name = Object.keys(partOf(view["extensions"])).find((key) => key.endsWith("_meshopt_compression"));
     if (name) refuse(nameOf(json, "bufferViews", k), `is compressed by ${name}, which is not read`);
   });
-  const list: DrawList = { blocks: [], vertexCount: 0, faces: [], parts: [], left: new Set() };
+  const list: DrawList = { blocks: [], vertexCount: 0, faces: [], parts: [], left: new Set(), notices: new Set() };
   const worlds = nodesOf(json);
   for (const node of worlds.keys()) {
     if (listOf(json, "nodes")[node]!["mesh"] !== undefined) readNode(document, node, worlds, list);
   }
+  checkExtensions(required); // a compression is refused by what it compresses, if the scene draws that
   const others = list.left.size > 0 ? `, only ${[...list.left].join(", ")}` : "";
   if (list.faces.length === 0) refuse("the scene", `has no triangles that could be deformed${others}`);
   return list;
+}
+
+function requiredOf(json: Part): string[] {
+  const required = json["extensionsRequired"] ?? [];
+  if (!Array.isArray(required)) refuse("“extensionsRequired”", "is no list");
+  if (!required.every((name) => typeof name === "string"))
+    refuse("“extensionsRequired”", "has an item that is no text");
+  return required as string[];
+}
+
+const isCompression = (extension: string) => /^KHR_draco_mesh_compression$|_meshopt_compression$/.test(extension);
+
+/** Extensions that leave the places of vertices alone; all else that is required could move them. */
+const harmless = /_materials_|_texture_|_lights_|_animation_|_audio|_xmp|KHR_mesh_quantization/;
+
+function checkExtensions(required: readonly string[]): void {
+  const unknown = required.find((name) => !harmless.test(name));
+  if (unknown !== undefined) refuse(`the extension ${unknown}`, "is required by the file and not known here");
 }
 
 /** The nodes of the scene, each before its children, with their transforms. */
@@ -152,6 +168,7 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Plac
   const size = Math.hypot(...placement.slice(0, 11));
   if (!(Math.abs(mat4.determinant(placement as mat4)) > 1e-12 * size ** 3)) {
     list.left.add(`what ${name} draws, which its scale flattens`);
+    list.notices.add(`What ${name} draws is flattened by its scale, and stays as it is.`);
     return;
   }
   const primitives = listOf(listOf(json, "meshes")[mesh]!, "primitives");
@@ -161,13 +178,19 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Plac
     if (partOf(primitive["extensions"])["KHR_draco_mesh_compression"]) {
       refuse(part, "is compressed by KHR_draco_mesh_compression, which is not read");
     }
-    const mode = (primitive["mode"] ?? triangles) as number;
+    const mode = wholeOf(primitive, "mode", triangles, part);
     const attributes = partOf(primitive["attributes"]);
     const accessor = (key: string) =>
       attributes[key] === undefined ? undefined : indexOf(json, attributes[key], "accessors", part);
     const [position, normal, tangent] = [accessor("POSITION"), accessor("NORMAL"), accessor("TANGENT")];
-    if (position === undefined || ![triangles, strip, fan].includes(mode)) {
+    if (![triangles, strip, fan].includes(mode)) {
       list.left.add("points and lines");
+      list.notices.add(`The ${mode === 0 ? "points" : "lines"} of ${part} stay as they are.`);
+      return;
+    }
+    if (position === undefined) {
+      list.left.add("primitives without positions");
+      list.notices.add(`There are no positions in ${part}: it stays as it is.`);
       return;
     }
     let block = own.find(
@@ -186,7 +209,11 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Plac
       if (list.vertexCount > most) refuse("the scene", `has more than ${most} vertices, which this page takes at most`);
     }
     const firstFace = list.faces.length / 3;
-    addTriangles(cornersOf(document, primitive, block.count, part), mode, block, list);
+    const corners = cornersOf(document, primitive, block.count, part);
+    addTriangles(corners, mode, block, list);
+    const { length } = corners;
+    const rest = mode === triangles ? length % 3 : length < 3 ? length : 0;
+    if (rest > 0) list.notices.add(`Corners at the end of ${part} make no triangle: ${rest} of ${length}.`);
     list.parts.push({ block, primitive: k, firstFace, faceCount: list.faces.length / 3 - firstFace });
   });
   list.blocks.push(...own);

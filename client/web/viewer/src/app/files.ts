@@ -242,7 +242,8 @@ export class Files {
     const welded = `, ${seamVertices.toLocaleString("en")} of them copies along seams, welded: the panel “Mesh” has a switch`;
     const loose = ` Where ${looseVertices.toLocaleString("en")} vertices of its borders lie near others it comes apart, unless “Weld within” in the panel “Mesh” joins them.`;
     const torn = looseVertices > 0 ? loose : "";
-    this.app.notify(`${first()}${name}: ${count} vertices${seamVertices > 0 ? welded : ""}.${torn}${up}`);
+    const still = stillIn(mesh);
+    this.app.notify(`${first()}${name}: ${count} vertices${seamVertices > 0 ? welded : ""}.${still}${torn}${up}`);
     return true;
   }
 
@@ -277,6 +278,21 @@ export class Files {
       void this.open([...(event.dataTransfer?.files ?? [])]);
     });
   }
+}
+
+/** How many parts that stay as they are the page names. */
+const mostNotices = 3;
+
+/** What of the file stays as it is. */
+function stillIn({ notices = [] }: Mesh): string {
+  const others = notices.length - mostNotices;
+  const more = others > 0 ? ` So ${others === 1 ? "does another part" : `do ${others.toLocaleString("en")} other parts`}.` : "";
+  return (
+    notices
+      .slice(0, mostNotices)
+      .map((notice) => ` ${notice}`)
+      .join("") + more
+  );
 }
 
 /** Puts the file's name before what is wrong with it. */

@@ -1,13 +1,11 @@
-import type { FileFault } from "lpdeform-client/mesh/fault";
+import { type Faces, isFaces, isVertex, readFaces } from "./dae_polygons.js";
 import { checkCopies, type Use } from "./uses.js";
-import { type Element, elementsIn, isNumber, wordsOf, XmlText } from "./xml.js";
+import { child, childrenOf, type Element, elementsIn, isNumber, wordsOf, XmlText } from "./xml.js";
 
 // What a COLLADA file has that the reader of three.js would leave out or tear without a word is refused by its line. Everything counts
 // from 0, as the file does.
 
-const faceKinds = ["triangles", "polylist", "polygons"];
 const lineKinds = ["lines", "linestrips"];
-const unreadKinds = ["tristrips", "trifans"];
 const numberCounts: Readonly<Record<string, number>> = {
   matrix: 16,
   bind_shape_matrix: 16,
@@ -27,8 +25,18 @@ const instances: Readonly<Record<string, string>> = {
 /** What has no part in the shapes that are shown: what other programs want, and physics. */
 const passedOver = ["extra", "library_physics_models", "library_physics_scenes"];
 
-/** Throws a FileFault. */
-export function checkDae(name: string, text: string): void {
+/** The faces of a mesh, all of which can be shown. */
+export interface DaeMesh {
+  xml: XmlText;
+  /** In words. */
+  called: string;
+  /** x, y, z of each vertex. */
+  places: readonly number[];
+  faces: readonly Faces[];
+}
+
+/** Returns the meshes. Throws a FileFault. */
+export function checkDae(name: string, text: string): DaeMesh[] {
   const xml = new XmlText(name, text);
   const root = xml.root();
   if (root.name !== "COLLADA") throw xml.fault(root.at, `the file begins with <${root.name}>, and COLLADA with <COLLADA>`);
@@ -39,14 +47,17 @@ export function checkDae(name: string, text: string): void {
     const { id } = element.attributes;
     if (id) named.set(`#${id}`, element).set(`${element.name}#${id}`, element);
   }
+  const meshes: DaeMesh[] = [];
   for (const element of all) {
     checkNumbers(xml, element);
     checkReference(xml, element, named);
-    if (element.name === "geometry") checkGeometry(xml, element);
+    const mesh = element.name === "geometry" ? child(element, "mesh") : undefined;
+    if (mesh) meshes.push(checkedMesh(xml, mesh, `the geometry “${idOf(element)}”`));
   }
   const uses = all.flatMap((element) => (element.name === "node" ? usesIn(xml, element) : []));
   const copies = uses.filter(({ name }) => name === "instance_node");
   checkCopies("node", uses, copies);
+  return meshes;
 }
 
 /** What a node has in it. A node without an id is called by its place. */
@@ -61,8 +72,6 @@ function usesIn(xml: XmlText, node: Element): Use[] {
   });
 }
 
-const child = (element: Element, name: string): Element | undefined => element.children.find((one) => one.name === name);
-const childrenOf = (element: Element, name: string) => element.children.filter((one) => one.name === name);
 const idOf = ({ attributes }: Element) => attributes["id"] ?? attributes["name"] ?? "";
 
 function checkNumbers(xml: XmlText, element: Element): void {
@@ -96,42 +105,36 @@ function checkReference(xml: XmlText, { name, attributes, at }: Element, named: 
   }
 }
 
-interface Source {
+export interface Source {
   /** Of points, or whatever it has. */
   count: number;
+  /** How many numbers each has. */
+  stride: number;
 }
 
 type Sources = ReadonlyMap<string | undefined, Source>;
 
-function checkGeometry(xml: XmlText, geometry: Element): void {
-  const mesh = child(geometry, "mesh");
-  if (!mesh) return;
-  const of = `the geometry “${idOf(geometry)}”`;
+function checkedMesh(xml: XmlText, mesh: Element, called: string): DaeMesh {
   const sources = new Map(childrenOf(mesh, "source").map((source) => [source.attributes["id"], sourceOf(xml, source)]));
   const vertices = child(mesh, "vertices");
   const position = vertices && childrenOf(vertices, "input").find(({ attributes }) => attributes["semantic"] === "POSITION");
-  if (!vertices || !position) throw xml.fault(mesh.at, `${of} has no <vertices> with a POSITION`);
-  checkPlaces(
+  if (!vertices || !position) throw xml.fault(mesh.at, `${called} has no <vertices> with a POSITION`);
+  const places = placesIn(
     xml,
     childrenOf(mesh, "source").find((source) => `#${source.attributes["id"]}` === position.attributes["source"]),
   );
   for (const input of childrenOf(vertices, "input")) known(xml, input, sources);
+  const sourceOfInput = (input: Element) => known(xml, isVertex(input) ? position : input, sources);
+  const faces: Faces[] = [];
   for (const primitive of mesh.children) {
     const { name } = primitive;
-    if (unreadKinds.includes(name)) {
-      throw xml.fault(
-        primitive.at,
-        `${of} has <${name}>, of which this page knows nothing; it reads <${faceKinds.join(">, <")}>`,
-      );
-    }
-    if (faceKinds.includes(name)) checkFaces(xml, primitive, of, vertices, known(xml, position, sources), sources);
+    if (isFaces(primitive)) faces.push(readFaces(xml, primitive, called, vertices, sourceOfInput));
     if (lineKinds.includes(name) && !childrenOf(primitive, "input").some(isVertex)) {
-      throw xml.fault(primitive.at, `<${name}> of ${of} has no input VERTEX`);
+      throw xml.fault(primitive.at, `<${name}> of ${called} has no input VERTEX`);
     }
   }
+  return { xml, called, places, faces };
 }
-
-const isVertex = ({ attributes }: Element) => attributes["semantic"] === "VERTEX";
 
 function known(xml: XmlText, input: Element, sources: Sources): Source {
   const { semantic, source = "" } = input.attributes;
@@ -152,11 +155,12 @@ function sourceOf(xml: XmlText, source: Element): Source {
   if (array && said !== undefined && Number(said) !== words.length) {
     throw xml.fault(array.at, `the <float_array> “${idOf(array)}” says that it has ${said} numbers, and has ${words.length}`);
   }
-  return { count: Math.floor(words.length / strideOf(source)) };
+  const stride = strideOf(source);
+  return { count: Math.floor(words.length / stride), stride };
 }
 
-function checkPlaces(xml: XmlText, source: Element | undefined): void {
-  if (!source) return; // said with its input
+function placesIn(xml: XmlText, source: Element | undefined): number[] {
+  if (!source) return []; // said with its input
   const array = child(source, "float_array");
   if (!array) throw xml.fault(source.at, `the <source> “${idOf(source)}” has no <float_array>`);
   const words = wordsOf(array.text);
@@ -176,84 +180,5 @@ function checkPlaces(xml: XmlText, source: Element | undefined): void {
       `the places “${idOf(source)}” have the stride ${stride ?? 1} and the offset ${offset}; this page reads 3 and 0`,
     );
   }
-}
-
-type Fault = (what: string, at?: number) => FileFault;
-
-function checkFaces(xml: XmlText, faces: Element, of: string, vertices: Element, places: Source, sources: Sources): void {
-  const { name } = faces;
-  const fault: Fault = (what, at = faces.at) => xml.fault(at, `<${name}> of ${of} ${what}`);
-  const said = faces.attributes["count"] ?? "";
-  if (!/^\d+$/.test(said)) throw fault(`has the count “${said}”`);
-  const count = Number(said);
-  const list = onlyList(faces, fault);
-  const inputs = checkedInputs(faces, vertices, fault);
-  const stride = Math.max(...inputs.map(offsetOf)) + 1;
-  const indices = indicesIn(xml, list);
-  const corners = name === "triangles" ? undefined : cornersOf(xml, faces, indices.length / stride, fault);
-  const polygonCount = corners?.length ?? count;
-  if (polygonCount !== count) throw fault(`says that it has ${count} polygons, and has ${polygonCount}`);
-  const wanted = stride * (corners ? corners.reduce((sum, one) => sum + one, 0) : 3 * count);
-  if (wanted !== indices.length) {
-    throw fault(`has ${count} polygons, for which <p> needs ${wanted} numbers; it has ${indices.length}`, list.at);
-  }
-  for (const input of inputs) {
-    const limit = isVertex(input) ? places.count : known(xml, input, sources).count;
-    for (let at = offsetOf(input); at < indices.length; at += stride) {
-      if (indices[at]! < limit) continue;
-      const polygon = polygonOf(corners, Math.floor(at / stride));
-      const what = isVertex(input) ? "vertex" : input.attributes["semantic"];
-      throw fault(`has a polygon ${polygon} with ${what} ${indices[at]}; there are ${limit}, counted from 0`, list.at);
-    }
-  }
-}
-
-/** The indices of all corners. */
-function onlyList(faces: Element, fault: Fault): Element {
-  const lists = childrenOf(faces, "p");
-  if (child(faces, "ph")) throw fault("has a polygon with holes (<ph>), which this page does not read");
-  if (faces.name === "polygons" && lists.length > 1) {
-    throw fault(`has ${lists.length} polygons; this page reads one, or a <polylist>`);
-  }
-  if (lists.length !== 1) throw fault(`has ${lists.length} lists <p> in place of 1`);
-  return lists[0]!;
-}
-
-const offsetOf = ({ attributes }: Element) => Number(attributes["offset"]);
-
-function checkedInputs(faces: Element, vertices: Element, fault: Fault): Element[] {
-  const inputs = childrenOf(faces, "input");
-  if (!inputs.some(isVertex)) throw fault("has no input VERTEX");
-  for (const { attributes, at } of inputs) {
-    const { semantic, source, offset = "" } = attributes;
-    if (!/^\d+$/.test(offset)) throw fault(`has an input ${semantic} with the offset “${offset}”`, at);
-    if (semantic === "VERTEX" && source !== `#${vertices.attributes["id"]}`) {
-      throw fault(`names “${source}”, which is no <vertices> of its <mesh>`, at);
-    }
-  }
-  return inputs;
-}
-
-function indicesIn(xml: XmlText, list: Element): number[] {
-  const words = wordsOf(list.text);
-  const wrong = words.find((word) => !/^\d+$/.test(word));
-  if (wrong !== undefined) throw xml.fault(list.at, `<${list.name}> has “${wrong}”, which is no whole number from 0`);
   return words.map(Number);
-}
-
-/** How many corners each polygon of a <polylist> or <polygons> has. */
-function cornersOf(xml: XmlText, faces: Element, all: number, fault: Fault): number[] {
-  const list = child(faces, "vcount");
-  if (faces.name === "polylist" && !list) throw fault("has no <vcount>");
-  const corners = faces.name === "polygons" ? [Math.floor(all)] : indicesIn(xml, list!);
-  const few = corners.findIndex((one) => one < 3);
-  if (few >= 0) throw fault(`has a polygon ${few} with ${corners[few]} corners`, list?.at);
-  return corners;
-}
-
-function polygonOf(corners: readonly number[] | undefined, corner: number): number {
-  if (!corners) return Math.floor(corner / 3);
-  let [polygon, end] = [0, corners[0] ?? 0];
-  while (end <= corner) end += corners[++polygon]!;
-  return polygon;
 }

@@ -1,7 +1,17 @@
-import { LoadingManager, type Material, Mesh, MeshStandardMaterial, type MeshPhongMaterial, type Object3D } from "three";
+import {
+  Loader,
+  LoadingManager,
+  type Material,
+  Mesh,
+  MeshStandardMaterial,
+  type MeshPhongMaterial,
+  type Object3D,
+} from "three";
 import { FileFault } from "lpdeform-client/mesh/fault";
 import { utf16Of } from "lpdeform-client/mesh/encodings";
 import { checkDae } from "./dae_faults.js";
+import { plainDae } from "./dae_plain.js";
+import { withTriangles } from "./dae_triangles.js";
 import { checkFbx } from "./fbx_faults.js";
 import { check3mf } from "./threemf_faults.js";
 import { checkUnpackedFbx, checkUnpackedZip } from "./unpacked.js";
@@ -24,9 +34,10 @@ export async function glbIn(file: File): Promise<Converted> {
   const kind = name.toLowerCase().split(".").at(-1) as Kind;
   const bytes = new Uint8Array(await file.arrayBuffer());
   try {
-    const scene = await quietly(() => readers[kind](name, bytes));
+    const lost = new Set<string>();
+    const scene = await quietly(() => readers[kind](name, bytes, lost));
     if (!hasTriangles(scene)) throw new FileFault(`${name} has no triangles${onlyLines(scene)}.`);
-    const left = [...checkedNumbers(name, scene), ...simplify(scene)];
+    const left = [...lost, ...checkedNumbers(name, scene), ...simplify(scene)];
     const { GLTFExporter } = await import("three/addons/exporters/GLTFExporter.js");
     const glb = await quietly(() => new GLTFExporter().parseAsync(scene, { binary: true, onlyVisible: false }));
     return { glb: glb as ArrayBuffer, left };
@@ -36,17 +47,21 @@ export async function glbIn(file: File): Promise<Converted> {
   }
 }
 
-const readers: Record<Kind, (name: string, bytes: Uint8Array<ArrayBuffer>) => Promise<Object3D>> = {
+/** `lost`: gets what is left out, in words. */
+type Reader = (name: string, bytes: Uint8Array<ArrayBuffer>, lost: Set<string>) => Promise<Object3D>;
+
+const readers: Record<Kind, Reader> = {
   async fbx(name, bytes) {
     await checkUnpackedFbx(bytes);
     checkFbx(name, bytes);
     const { FBXLoader } = await import("three/addons/loaders/FBXLoader.js");
     return new FBXLoader(nothingElse()).parse(bytes.buffer, "");
   },
-  async dae(name, bytes) {
+  async dae(name, bytes, lost) {
     const { ColladaLoader } = await import("three/addons/loaders/ColladaLoader.js");
-    const text = xmlText(bytes);
-    checkDae(name, text);
+    const plain = plainDae(name, xmlText(bytes));
+    const { text, left } = withTriangles(name, plain, checkDae(name, plain));
+    for (const what of left) lost.add(what);
     const read = new ColladaLoader(nothingElse()).parse(text, "");
     if (!read?.scene) throw new Error("its XML is broken");
     return read.scene;
@@ -156,7 +171,14 @@ function simplify(scene: Object3D): readonly string[] {
   const plain = (material: Material) => {
     const { name, color, opacity, transparent, side } = material as MeshPhongMaterial;
     if (Object.values(material).some((value) => value?.isTexture)) left.add("textures");
-    return new MeshStandardMaterial({ name, ...(color && { color }), opacity, transparent, side });
+    const isNone = name === Loader.DEFAULT_MATERIAL_NAME; // which the reader of COLLADA makes pink
+    return new MeshStandardMaterial({
+      name: isNone ? "" : name,
+      ...(color && !isNone && { color }),
+      opacity,
+      transparent,
+      side,
+    });
   };
   scene.traverse((object) => {
     if (object.animations.length > 0) left.add("animations");

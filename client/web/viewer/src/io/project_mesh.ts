@@ -5,14 +5,15 @@ import { readGltf } from "lpdeform-client/mesh/gltf";
 import { readObj } from "lpdeform-client/mesh/obj";
 import { isObject, type Sections } from "./sections.js";
 
-/** Where each part of a mesh goes in a project. One that is missing does not compile. */
-const parts: { readonly [K in keyof Required<Mesh>]: "head" | "array" | "source" | "files" } = {
+/** Where each part of a mesh goes in a project; what is “again” comes from the source when that is read. One that is missing does not compile. */
+const parts: { readonly [K in keyof Required<Mesh>]: "head" | "array" | "source" | "files" | "again" } = {
   name: "head",
   positions: "array",
   exact: "array",
   faces: "array",
   corners: "array",
   beside: "head",
+  notices: "again",
   obj: "source",
   materials: "files",
   gltf: "source",

@@ -5,6 +5,8 @@ import { FileFault } from "lpdeform-client/mesh/fault";
 export interface Tag {
   /** Without its prefix. */
   name: string;
+  /** Empty if it has none. */
+  prefix: string;
   attributes: Readonly<Record<string, string>>;
   /** Whether it is the end of an element; an element without contents has both a beginning and an end. */
   isEnd: boolean;
@@ -15,6 +17,8 @@ export interface Tag {
 
 export interface Element extends Tag {
   children: Element[];
+  /** Where its end tag ends. */
+  closed: number;
   /** What stands in it, as a reader of XML gives it; none if there are elements. */
   text: string;
 }
@@ -40,7 +44,7 @@ export class XmlText {
     return new FileFault(`${this.name}, line ${this.lineOf(at)}: ${what}.`);
   }
 
-  #cut(what: string): FileFault {
+  cut(what: string): FileFault {
     return new FileFault(`${this.name} ends too soon: ${what} has no end.`);
   }
 
@@ -64,28 +68,29 @@ export class XmlText {
       }
       tag.lastIndex = at;
       const [whole, slash, full, inner] = tag.exec(text) ?? [];
-      if (whole === undefined && text.indexOf(">", at) < 0) throw this.#cut(`the tag of line ${this.lineOf(at)}`);
+      if (whole === undefined && text.indexOf(">", at) < 0) throw this.cut(`the tag of line ${this.lineOf(at)}`);
       if (whole === undefined) throw this.fault(at, "the tag that begins here is broken");
-      const name = full!.slice(full!.indexOf(":") + 1);
+      const colon = full!.indexOf(":");
+      const [prefix, name] = [full!.slice(0, Math.max(colon, 0)), full!.slice(colon + 1)];
       const end = at + whole.length;
       if (slash) {
         const begin = open.pop();
         if (begin?.name !== full) {
           throw this.fault(at, `</${full}> ends ${begin ? `<${begin.name}> of line ${this.lineOf(begin.at)}` : "nothing"}`);
         }
-        yield { name, attributes: {}, isEnd: true, at, end };
+        yield { name, prefix, attributes: {}, isEnd: true, at, end };
       } else {
         const attributes = attributesIn(inner!);
         if (hasRoot && open.length === 0) throw this.fault(at, `<${full}> comes after the end of the XML`);
         hasRoot = true;
-        yield { name, attributes, isEnd: false, at, end };
-        if (inner!.endsWith("/")) yield { name, attributes, isEnd: true, at: end, end };
+        yield { name, prefix, attributes, isEnd: false, at, end };
+        if (inner!.endsWith("/")) yield { name, prefix, attributes, isEnd: true, at: end, end };
         else open.push({ name: full!, at });
       }
       at = end;
     }
     const last = open.at(-1);
-    if (last) throw this.#cut(`<${last.name}> of line ${this.lineOf(last.at)}`);
+    if (last) throw this.cut(`<${last.name}> of line ${this.lineOf(last.at)}`);
   }
 
   /** The outermost element. Throws a FileFault if there is none. */
@@ -95,9 +100,10 @@ export class XmlText {
     for (const tag of this.tags()) {
       if (tag.isEnd) {
         const element = open.pop() as Element;
+        element.closed = tag.end;
         if (element.children.length === 0) element.text = plainText(this.text.slice(element.end, tag.at));
       } else {
-        const element = { ...tag, children: [], text: "" };
+        const element = { ...tag, children: [], closed: tag.end, text: "" };
         open.at(-1)!.children.push(element);
         open.push(element);
       }
@@ -127,6 +133,10 @@ function plainText(text: string): string {
     return code <= 0x10ffff ? String.fromCodePoint(code) : whole;
   });
 }
+
+export const child = (element: Element, name: string): Element | undefined => element.children.find((one) => one.name === name);
+
+export const childrenOf = (element: Element, name: string): Element[] => element.children.filter((one) => one.name === name);
 
 /** An element and all that stand in it, but for those of the names `without` and what stands in them. */
 export function* elementsIn(element: Element, without: readonly string[]): Generator<Element> {

@@ -7,12 +7,13 @@ import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
 import { parseMesh } from "lpdeform-client/mesh/read";
 import { faultsOf } from "../gltf_validator.js";
-import { columns, make3mf, makeBinaryFbx, makeDae, makeFbx } from "../made_foreign.js";
+import { columns, make3mf, makeBinaryFbx, makeDae, makeFbx, makeOddDae } from "../made_foreign.js";
 import { User } from "./user.js";
 
 const dist = join(import.meta.dirname, "../../dist");
 const files = {
   "tube.dae": Buffer.from(makeDae()),
+  "odd.dae": Buffer.from(makeOddDae()),
   "tube.fbx": Buffer.from(makeFbx()),
   "tube.3mf": Buffer.from(make3mf()),
 };
@@ -81,6 +82,19 @@ describe("the viewer", () => {
     },
   );
 
+  it("opens strips, fans and polygons, with prefixes and a DOCTYPE, and loads nothing that this names", async () => {
+    const asked: string[] = [];
+    user.page.on("request", (request) => asked.push(request.url()));
+    await user.openFiles({ name: "odd.dae", content: files["odd.dae"] });
+    await notice("odd.dae is opened as odd.glb.");
+    await user.settled();
+    const heights = (await user.positions()).filter((_, k) => k % 3 === 1);
+    expect([Math.min(...heights), Math.max(...heights)].map((y) => y.toFixed(4))).toEqual(["5.0000", "13.0000"]);
+    expect(await user.ask<number>("app.mesh.faces.length")).toBe(3 * 384);
+    expect(asked.filter((url) => url.includes("dtd"))).toEqual([]);
+    expect(user.errors).toEqual([]);
+  });
+
   it("loads nothing that a file names, and says what is left out", async () => {
     const asked: string[] = [];
     user.page.on("request", (request) => asked.push(request.url()));
@@ -101,6 +115,11 @@ describe("the viewer", () => {
       "a.dae",
       '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"></COLLADA>',
       "a.dae, line 1: <COLLADA> has no <asset>.",
+    ],
+    [
+      "a.dae",
+      '<!DOCTYPE a [<!ENTITY b "c">]><COLLADA/>',
+      "a.dae, line 1: the DOCTYPE declares an entity (<!ENTITY), which this page does not read.",
     ],
     ["a.3mf", "PK", "a.3mf cannot be read as 3MF"],
     ["a.3mf", Buffer.from(make3mf(501e6)), "a.3mf cannot be read as 3MF: unpacked it has 501"],

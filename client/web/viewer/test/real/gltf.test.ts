@@ -5,7 +5,7 @@ import { join } from "node:path";
 import { promisify } from "node:util";
 import { afterAll, beforeAll, expect, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
-import { readGltfDocument } from "lpdeform-client/mesh/gltf_document";
+import { readGltfDocument, writeGlb } from "lpdeform-client/mesh/gltf_document";
 import { parseMesh } from "lpdeform-client/mesh/read";
 import { faultsOf } from "../gltf_validator.js";
 import { columns, makeGlb, rows } from "../made_glb.js";
@@ -64,6 +64,38 @@ it("a GLB that is opened in the page, bent and saved has everything that it had"
   for (let k = 0; k <= rows; ++k) {
     const [first, last] = [row(k)[0]!, row(k).at(-1)!];
     expect([...after.positions.slice(3 * first, 3 * first + 3)]).toEqual([...after.positions.slice(3 * last, 3 * last + 3)]);
+  }
+});
+
+it("a GLB with lines and points is opened, and the page says which stay as they are", async () => {
+  const document = readGltfDocument("tube.glb", makeGlb(true), new Map());
+  const { primitives } = (document.json as any).meshes[0];
+  const more = Array.from({ length: 5 }, (_, k) => ({ ...primitives[0], mode: k % 2 }));
+  primitives.push(...more);
+  await user.openFiles({ name: "tube.glb", content: Buffer.from(writeGlb(document)) });
+  const stay = [1, 2, 3]
+    .map((k) => `The ${k % 2 ? "points" : "lines"} of primitive ${k} of mesh 0 stay as they are.`)
+    .join(" ");
+  await user.page.locator(".notice", { hasText: `${stay} So do 2 other parts.` }).waitFor();
+  primitives.length = 2;
+  await user.openFiles({ name: "tube.glb", content: Buffer.from(writeGlb(document)) });
+  await user.page.locator(".notice", { hasText: "The points of primitive 1 of mesh 0 stay as they are. Shown" }).waitFor();
+  document.json["extensionsRequired"] = ["KHR_draco_mesh_compression"];
+  await user.openFiles({ name: "tube.glb", content: Buffer.from(writeGlb(document)) });
+  const refused = "The extension KHR_draco_mesh_compression is required by the file and not known here.";
+  await user.page.locator(".notice", { hasText: refused }).waitFor();
+  expect(user.errors).toEqual([]);
+});
+
+it("the command line and the page refuse the same compressions that no primitive uses, in the same words", async () => {
+  for (const name of ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"]) {
+    const document = readGltfDocument("tube.glb", makeGlb(true), new Map());
+    document.json["extensionsRequired"] = [name];
+    const bytes = writeGlb(document);
+    await writeFile(join(folder, "tube.glb"), bytes);
+    const words = `he extension ${name} is required by the file and not known here`;
+    expect(() => parseMesh("tube.glb", bytes)).toThrow(words);
+    await expect(promisify(execFile)(program, ["info", join(folder, "tube.glb")])).rejects.toThrow(words);
   }
 });
 
