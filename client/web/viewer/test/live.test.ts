@@ -248,7 +248,10 @@ describe("what is drawn", () => {
 
   it("has each of several faces in one place once, the last of them, and keeps what is turned the other way", () => {
     const faces = [0, 1, 2, 0, 2, 3, 1, 2, 0, 2, 1, 0, 0, 1, 3, 2, 0, 1, 0, 2, 3];
-    const drawn = drawnOf({ positions: Float32Array.from({ length: 12 }, (_, k) => (k * k) % 7), faces: Uint32Array.from(faces) });
+    const drawn = drawnOf({
+      positions: Float32Array.from({ length: 12 }, (_, k) => (k * k) % 7),
+      faces: Uint32Array.from(faces),
+    });
     expect([...drawn.once].map((vertex) => drawn.source[vertex])).toEqual([2, 1, 0, 0, 1, 3, 2, 0, 1, 0, 2, 3]);
     expect([...drawn.once]).toEqual([...drawn.indices.slice(9)]);
     expect([...drawn.indices].map((vertex) => drawn.source[vertex])).toEqual(faces);

@@ -238,9 +238,7 @@ const tools: readonly State[] = [
     query: "?shape=bar",
     act: async (user) => {
       await pull(user, "Top", 150, 130);
-      await user.page.getByText("Blend through p").click();
-      await user.page.getByRole("checkbox", { name: "Prepare blending" }).setChecked(true, { force: true });
-      await user.page.getByRole("slider", { name: "Blend p" }).and(user.page.locator(":enabled")).waitFor({ timeout: 60_000 });
+      await user.page.getByText("All shapes are ready.").waitFor({ timeout: 60_000 });
     },
   },
   {
