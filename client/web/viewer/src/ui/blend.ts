@@ -15,6 +15,10 @@ export function blendPanel(app: App): HTMLElement {
   const blend = new Blend(app);
   const status = el("p", { className: "quiet" });
   const said = el("p", { className: "quiet", role: "status" });
+  const say = (words: string) => {
+    setText(said, words);
+    status.hidden = words !== "";
+  };
   let p = app.document.p;
   const { element, show } = slider(
     "Blend p",
@@ -24,11 +28,11 @@ export function blendPanel(app: App): HTMLElement {
     (share) => {
       p = pAt(share);
       show(share, short(p));
-      setText(said, wordsOf(p, blend.show(p)));
+      say(wordsOf(p, blend.show(p)));
     },
     () => {
       blend.release(p);
-      setText(said, "");
+      say("");
     },
   );
   element.title = "Passes through the shapes of all p at once, in the first picture";
@@ -49,7 +53,7 @@ export function blendPanel(app: App): HTMLElement {
   blend.facts.watchAll(showStatus);
   app.facts.watch(({ mesh, document }) => [mesh, document.isAutomatic, document.handles.length], showStatus);
   const ends = el("p", { className: "ends quiet" }, el("span", {}, "paper, p = 1"), el("span", {}, `rubber, p = ${mostP}`));
-  return el("div", { className: "blend" }, element, ends, status, said);
+  return el("div", { className: "blend" }, element, ends, el("div", { className: "told" }, status, said));
 }
 
 function statusOf(app: App, blend: Blend): string {
