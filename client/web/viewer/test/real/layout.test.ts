@@ -349,3 +349,15 @@ it("a picture keeps its size while it is pressed, whatever is said meanwhile", a
   expect(await user.page.locator(".notice").isVisible()).toBe(true);
   await user.ask("app.facts.set({ notice: undefined })");
 });
+
+it("the shape is fitted again when the panel opens after the first drag", async () => {
+  const fresh = await User.open(`${service.url}/?shape=creature&detail=coarse`, { width: 820, height: 1180, hasTouch: true });
+  await fresh.settled();
+  const [vertex] = await fresh.ask<number[]>(`document().handles.find(({ name }) => name === "Head").vertices`);
+  await fresh.drag(await fresh.vertexOnPage(vertex!), -90, -60);
+  await fresh.settled();
+  await fresh.page.getByRole("button", { name: "Side panel" }).click();
+  await drawn(fresh);
+  expect(await fresh.page.evaluate(covering)).toEqual([]);
+  await fresh.close();
+});
