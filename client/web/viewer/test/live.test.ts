@@ -246,6 +246,20 @@ describe("what is drawn", () => {
     expect(drawnOf({ ...mesh, faces: Uint32Array.from([...mesh.faces, 0, 1, 2]) }).isClosed).toBe(false);
   });
 
+  it("has each of several faces in one place once, the last of them, and keeps what is turned the other way", () => {
+    const faces = [0, 1, 2, 0, 2, 3, 1, 2, 0, 2, 1, 0, 0, 1, 3, 2, 0, 1, 0, 2, 3];
+    const drawn = drawnOf({
+      positions: Float32Array.from({ length: 12 }, (_, k) => (k * k) % 7),
+      faces: Uint32Array.from(faces),
+    });
+    expect([...drawn.once].map((vertex) => drawn.source[vertex])).toEqual([2, 1, 0, 0, 1, 3, 2, 0, 1, 0, 2, 3]);
+    expect([...drawn.once]).toEqual([...drawn.indices.slice(9)]);
+    expect([...drawn.indices].map((vertex) => drawn.source[vertex])).toEqual(faces);
+    const { mesh } = shapeKinds[0]!.make("coarse");
+    const whole = drawnOf(mesh);
+    expect(whole.once).toBe(whole.indices);
+  });
+
   it("follows the mesh's vertices, with normals that look outwards", () => {
     const { mesh } = shapeKinds[0]!.make("coarse");
     const drawn = drawnOf(mesh);

@@ -8,6 +8,11 @@ export interface Drawn {
   source: Uint32Array;
   /** Three drawn vertices per face. */
   indices: Uint32Array;
+  /**
+   * `indices` without the faces that a later face lies over with the same vertices in the same turn. If there are none, it is `indices`
+   * itself.
+   */
+  once: Uint32Array;
   /** Whether every edge has a face on either side. */
   isClosed: boolean;
 }
@@ -47,7 +52,27 @@ export function drawnOf({ positions, faces }: Pick<Mesh, "positions" | "faces">,
     }
     indices[corner] = drawn[top]!;
   }
-  return { source: Uint32Array.from(source), indices, isClosed };
+  const isRepeated = edges.size < faces.length; // else no two faces have a directed edge in common
+  return { source: Uint32Array.from(source), indices, once: isRepeated ? onceOf(indices, faces) : indices, isClosed };
+}
+
+/** The corners in `indices` of faces that no later one is like. */
+function onceOf(indices: Uint32Array, faces: Uint32Array): Uint32Array {
+  const edges = new Pairs(faces.length / 3); // for the edge from a face's least vertex: the last such face
+  const known = new Pairs(faces.length / 3); // for that face and the third vertex: any face
+  const once = new Uint32Array(indices.length);
+  let begin = indices.length;
+  for (let face = faces.length / 3 - 1; face >= 0; --face) {
+    let least = 3 * face;
+    for (const corner of [3 * face + 1, 3 * face + 2]) if (faces[corner]! < faces[least]!) least = corner;
+    const next = nextCorner(least);
+    const [a, b, c] = [faces[least]!, faces[next]!, faces[nextCorner(next)]!];
+    if (edges.get(a, b) < 0) edges.set(a, b, face);
+    if (!known.set(edges.get(a, b), c, face)) continue;
+    begin -= 3;
+    once.set(indices.subarray(3 * face, 3 * face + 3), begin);
+  }
+  return begin === 0 ? indices : once.slice(begin);
 }
 
 function nextCorner(corner: number): number {

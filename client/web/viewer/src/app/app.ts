@@ -379,6 +379,11 @@ export class App implements Workbench {
     return this.cancelGesture() || held.includes(true);
   }
 
+  /** What the pointer has done so far is in the document, for whoever saves it. */
+  flush(): void {
+    for (const editing of this.#editings) editing.flush();
+  }
+
   /** Ends drags by the pointer in every picture: what they have moved becomes a step. */
   endAll(): void {
     for (const editing of this.#editings) editing.release();

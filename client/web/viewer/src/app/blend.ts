@@ -9,11 +9,18 @@ import type { App } from "./app.js";
 
 /** How long nothing must have changed before shapes are prepared. */
 const idleMs = 1500;
+/** Shapes of a mesh with more vertices are prepared only once the slider is used. So many take two cores some 20 s. */
+export const mostUnasked = 20_000;
+/** A solve sends frames on the way, which nobody sees. */
+const framesPerSecond = 10;
 
 export interface BlendFacts {
-  isOn: boolean;
+  /** Whether the mesh is so large that the slider must be used first. */
+  waitsForUse: boolean;
   /** How many shapes are ready. */
   ready: number;
+  /** About how long the others take, as far as this is known. */
+  secondsLeft: number | undefined;
   /** Why no more are prepared, in a sentence; empty if nothing is wrong. */
   fault: string;
 }
@@ -23,31 +30,38 @@ function workOf({ handles, paintedP, stiffness, region, isAutomatic }: Document)
   return [handles, paintedP, stiffness, region, isAutomatic];
 }
 
-/** Prepares the first picture's shape for several p while nothing else is done, so that a slider passes through them at once. */
+/**
+ * Prepares the first picture's shape for several p while nothing else is done, so that a slider passes through them at once. There is
+ * a session for it only while it solves: any change of the document, and a page that is not seen, end it.
+ */
 export class Blend {
-  readonly facts = new State<BlendFacts>({ isOn: false, ready: 0, fault: "" });
+  readonly facts = new State<BlendFacts>({ waitsForUse: false, ready: 0, secondsLeft: undefined, fault: "" });
+  /** In the order of blendPs. */
   #shapes = new Map<number, Shape>();
+  /** Whether the slider was used since the work has changed. */
+  #isAsked = false;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #run = new AbortController();
 
   constructor(readonly app: App) {
     app.facts.watch(
       ({ mesh, document }) => [mesh, ...workOf(document)],
-      () => this.#restart(),
+      () => this.#drop(),
     );
     app.view.watch(
       ({ isWelded, weldTolerance }) => [isWelded, weldTolerance],
-      () => this.#restart(),
+      () => this.#drop(),
     );
+    app.facts.watch(
+      ({ document }) => [document],
+      () => this.#soon(),
+    );
+    document.addEventListener("visibilitychange", () => this.#soon());
   }
 
-  switch(isOn: boolean): void {
-    this.facts.set({ isOn });
-    this.#restart();
-  }
-
-  /** Shows the shape at p in the first picture, until release(). Undefined if none is ready. */
+  /** Shows the shape at p in the first picture, until release(). Undefined if none is ready; then they are prepared from now on. */
   show(p: number): Blended | undefined {
+    if (this.facts.now.waitsForUse || this.facts.now.fault) this.#ask();
     const found = blended(this.#shapes, p);
     if (found) this.app.preview(found.shape);
     return found;
@@ -60,32 +74,58 @@ export class Blend {
     if (app.document.p !== p) app.change({ ...app.document, p });
   }
 
-  /** The shapes are those of other work, or not wanted any more. */
-  #restart(): void {
+  #ask(): void {
+    this.#isAsked = true;
+    this.facts.set({ fault: "" });
+    this.#soon();
+  }
+
+  /** The shapes are those of other work. */
+  #drop(): void {
+    this.#shapes.clear();
+    this.#isAsked = false;
+    this.app.endPreview(false);
+    this.facts.set({ ready: 0, secondsLeft: undefined, fault: "" });
+    this.#soon();
+  }
+
+  /** Stops at once, and goes on when nothing else has been done for some time. */
+  #soon(): void {
     clearTimeout(this.#timer);
     this.#run.abort();
-    this.#shapes.clear();
-    this.app.endPreview(false);
-    this.facts.set({ ready: 0, fault: "" });
-    const { isAutomatic, handles } = this.app.document;
-    if (!this.facts.now.isOn || isAutomatic || handles.length === 0) return;
-    this.#timer = setTimeout(() => void this.#prepare(), idleMs);
+    const { document: work, mesh } = this.app;
+    const isPossible = !work.isAutomatic && work.handles.length > 0;
+    const waitsForUse = isPossible && !this.#isAsked && mesh.positions.length > 3 * mostUnasked;
+    this.facts.set({ waitsForUse });
+    const isLeft = this.#shapes.size < blendPs.length && this.facts.now.fault === "";
+    if (isPossible && !waitsForUse && isLeft && document.visibilityState !== "hidden") this.#later();
+  }
+
+  #later(): void {
+    this.#timer = setTimeout(() => (this.#isQuiet ? void this.#prepare() : this.#later()), idleMs);
+  }
+
+  /** Whether no drag is under way, and the server has solved for all that is shown. */
+  get #isQuiet(): boolean {
+    const { facts, history, panes } = this.app;
+    const isSolved = panes.every(({ live, frame }) => live && !live.isSettling && frame?.isFinal);
+    return facts.now.status.kind === "live" && history.settled === history.present && isSolved;
   }
 
   async #prepare(): Promise<void> {
-    const { mesh, document, panes } = this.app;
-    if (panes[0]!.live?.isSettling) {
-      this.#timer = setTimeout(() => void this.#prepare(), idleMs);
-      return;
-    }
+    const { mesh, document } = this.app;
     const { signal } = (this.#run = new AbortController());
+    const begun = performance.now();
+    // Each is solved from the one before, also the first that is new.
+    const ps = blendPs.slice(Math.max(this.#shapes.size - 1, 0));
     try {
-      const documents = blendPs.map((p) => ({ ...document, p }));
-      let next = 0;
-      for await (const shape of shapesOf(mesh, documents, weldOf(derivedOf(mesh)), signal)) {
+      const documents = ps.map((p) => ({ ...document, p }));
+      let done = 0;
+      for await (const shape of shapesOf(mesh, documents, weldOf(derivedOf(mesh)), signal, framesPerSecond)) {
         if (signal.aborted) return;
-        this.#shapes.set(blendPs[next++]!, shape);
-        this.facts.set({ ready: this.#shapes.size });
+        this.#shapes.set(ps[done++]!, shape);
+        const secondsLeft = (((performance.now() - begun) / 1000) * (ps.length - done)) / done;
+        this.facts.set({ ready: this.#shapes.size, secondsLeft });
       }
     } catch (thrown) {
       if (!signal.aborted) this.facts.set({ fault: sentence((thrown as LpdeformError).message) });

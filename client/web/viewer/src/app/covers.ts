@@ -1,7 +1,10 @@
 import type { Box } from "../model/free_room.js";
 
 const controls = ".rail, .options, .legend, .dock, .split ~ .dock > *";
-/** What the page says of the work that has just been opened. Where room is little, it goes over the shape until the next press. */
+/**
+ * What the page says of the work that has just been opened. Where room is little, the notice stands beside the pictures (small.css), and
+ * the others lie over the shape until the next press.
+ */
 const said = ", .notice, .aside, .restored, .banner";
 /** Where small.css puts the controls beside the pictures. */
 const littleRoom = matchMedia(

@@ -50,9 +50,15 @@ export class Editing implements PointingTarget {
     return this.pane.stage.gizmo.cancel() || this.#pointing.cancel();
   }
 
+  /** What the pointer has done so far is in the document. */
+  flush(): void {
+    this.#pointing.flush();
+  }
+
   /** Ends a drag as if the pointer was released: what it has moved becomes a step; what it has drawn is dropped. */
   release(): void {
     if (!this.pane.stage.gizmo.isDragging && !this.#pointing.isBusy) return;
+    this.flush();
     this.work.endGesture();
     this.cancel();
   }

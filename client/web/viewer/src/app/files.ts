@@ -213,6 +213,7 @@ export class Files {
   }
 
   saveHandles(): void {
+    this.app.flush();
     if (this.app.document.handles.length === 0) {
       return this.app.notify(`There are no handles to save: ${pressing()} the surface to place one.`, true);
     }

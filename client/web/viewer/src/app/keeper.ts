@@ -192,6 +192,7 @@ export class Keeper {
     if (this.#isSaving && !isLeaving) return this.#soon();
     this.#isSaving = true;
     const number = ++this.#saves;
+    this.app.flush();
     const { isDark: _, hasSingleKeys: __, ...view }: View = this.app.view.now;
     const works = this.app.worthKeeping;
     const keys = new Map(works.map(({ mesh }) => [mesh, this.#kept.get(mesh) ?? `${this.#id}/${newId()}`]));

@@ -32,11 +32,12 @@ export class PaintStroke implements Stroke {
   move(at: PointerAt): void {
     if (!at.hit) return;
     this.#ahead.push(at);
-    if (this.work.mesh.positions.length < 3 * largeVertices) this.#paint();
-    else this.#task ??= setTimeout(() => this.#paint());
+    if (this.work.mesh.positions.length < 3 * largeVertices) this.flush();
+    else this.#task ??= setTimeout(() => this.flush());
   }
 
-  #paint(): void {
+  /** Paints the places that wait. */
+  flush(): void {
     clearTimeout(this.#task);
     this.#task = undefined;
     const places = this.#ahead;
@@ -76,13 +77,14 @@ export class PaintStroke implements Stroke {
   }
 
   end(): void {
-    this.#paint();
+    this.flush();
     this.work.facts.set({ pointedOut: nothing });
     this.work.endGesture();
   }
 
   cancel(): void {
     clearTimeout(this.#task);
+    this.#ahead = [];
     this.work.facts.set({ pointedOut: nothing });
     this.work.cancelGesture();
   }

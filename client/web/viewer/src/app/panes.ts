@@ -23,7 +23,7 @@ export class Panes {
   readonly element = document.createElement("div");
   readonly all: Pane[] = [];
   #turned: Pane | undefined;
-  #fitted = "";
+  #fitted: Look | undefined;
 
   /** `added`: called when a pane is there, before its view can be changed. */
   constructor(
@@ -85,12 +85,12 @@ export class Panes {
     const far = ({ stage: { look } }: Pane) => Math.hypot(...look.position.map((value, axis) => value - look.target[axis]!));
     const farthest = this.all.reduce((most, pane) => (far(pane) > far(most) ? pane : most));
     for (const pane of this.all) if (pane !== farthest) pane.stage.lookAs(farthest.stage);
-    this.#fitted = JSON.stringify(farthest.stage.look);
+    this.#fitted = farthest.stage.look;
   }
 
   /** Whether the user has left the view as fit() had it. */
   get isAsFitted(): boolean {
-    return this.#fitted === JSON.stringify(this.all[0]!.stage.look);
+    return this.#fitted !== undefined && isSameLook(this.#fitted, this.all[0]!.stage.look);
   }
 
   lookFrom(look: Look): void {
@@ -131,4 +131,11 @@ export class Panes {
       stage.canvas.setAttribute("aria-describedby", keysText.id);
     }
   }
+}
+
+/** But for rounding: controls that are made again turn the camera to where it is. */
+function isSameLook(a: Look, b: Look): boolean {
+  const far = Math.hypot(...a.position.map((value, axis) => value - a.target[axis]!));
+  const ends = [...a.position, ...a.target];
+  return [...b.position, ...b.target].every((value, k) => Math.abs(value - ends[k]!) <= 1e-9 * far);
 }

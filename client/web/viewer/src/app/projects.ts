@@ -5,6 +5,7 @@ import type { App } from "./app.js";
 
 /** The present work as a file. */
 export function saveProject(app: App): Promise<Uint8Array<ArrayBuffer>> {
+  app.flush();
   const { mesh, document, view, look } = app;
   return writeProject({ mesh, document, view: view.now, look });
 }

@@ -5,19 +5,20 @@ import type { Document } from "../model/document.js";
 import type { Mesh } from "lpdeform-client/mesh/mesh";
 
 /**
- * The shapes of these documents, in this order, each solved from the one before, in a session of its own. `weld`: as in Live. Throws
- * an LpdeformError.
+ * The shapes of these documents, in this order, each solved from the one before, in a session of its own. `weld`: as in Live.
+ * `maxFramesPerSecond`: of those that are not shown; 0: without limit. Throws an LpdeformError.
  */
 export async function* shapesOf(
   mesh: Mesh,
   documents: readonly Document[],
   weld: Weld | undefined,
   signal: AbortSignal,
+  maxFramesPerSecond = 0,
 ): AsyncGenerator<Shape> {
   const { positions, exact, faces } = mesh;
   const session = await openSession(
     { vertices: exact ?? positions, faces },
-    { freeComponents: "follow", signal, ...(weld && { weld }) },
+    { freeComponents: "follow", maxFramesPerSecond, signal, ...(weld && { weld }) },
   );
   try {
     let told = newSession;
@@ -29,6 +30,7 @@ export async function* shapesOf(
       yield { positions, distortion };
     }
   } finally {
-    void session.close().catch(() => undefined); // it expires by itself if the server is away
+    // If the page is being left, the server is told nevertheless.
+    void session.close({ keepalive: true }).catch(() => undefined); // it expires by itself if the server is away
   }
 }

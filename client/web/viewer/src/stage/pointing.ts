@@ -28,6 +28,8 @@ export interface PointerAt {
 /** A press that was taken, until it is released. */
 export interface Stroke {
   move(at: PointerAt): void;
+  /** Does at once what waits for a task of its own. */
+  flush?(): void;
   end(): void;
   /** A second finger came, or Escape. */
   cancel(): void;
@@ -68,6 +70,11 @@ export class Pointing {
     this.#stroke = this.#press = undefined;
     taken?.stroke.cancel();
     return taken !== undefined || wasPressed;
+  }
+
+  /** A stroke does what it has put off. */
+  flush(): void {
+    this.#stroke?.stroke.flush?.();
   }
 
   at(event: PointerEvent | MouseEvent): PointerAt {

@@ -72,7 +72,7 @@ export class Surface {
     const geometry = this.#geometry;
     const { center, diagonal } = this.#derived.bounds;
     geometry.boundingSphere = new three.Sphere(new three.Vector3(...center), diagonal / 2); // three.js sorts by it
-    geometry.setIndex(new three.BufferAttribute(drawn.indices, 1));
+    geometry.setIndex(new three.BufferAttribute(drawn.once, 1));
     geometry.setAttribute("position", live(this.#at.positions, 3));
     geometry.setAttribute("normal", live(this.#at.normals, 3));
     geometry.setAttribute("value", live(this.#values, 1));
@@ -236,7 +236,7 @@ export class Surface {
   #findEdges(): void {
     const { geometry } = this.#wire;
     if (geometry.index) return;
-    const { indices, source } = this.#drawn;
+    const { once: indices, source } = this.#drawn;
     const lines = new Uint32Array(2 * indices.length);
     const known = new Pairs(indices.length);
     for (let corner = 0; corner < indices.length; ++corner) {
@@ -254,7 +254,13 @@ export class Surface {
 
   #makeGhost(): three.Mesh {
     const geometry = new three.BufferGeometry();
-    geometry.setIndex(new three.BufferAttribute(this.mesh.faces, 1));
+    const { once, source } = this.#drawn;
+    geometry.setIndex(
+      new three.BufferAttribute(
+        once.map((vertex) => source[vertex]!),
+        1,
+      ),
+    );
     geometry.setAttribute("position", new three.BufferAttribute(this.mesh.positions, 3));
     const { center, diagonal } = this.#derived.bounds;
     geometry.boundingSphere = new three.Sphere(new three.Vector3(...center), diagonal / 2);

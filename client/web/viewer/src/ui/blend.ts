@@ -1,23 +1,24 @@
 import type { App } from "../app/app.js";
 import { Blend } from "../app/blend.js";
-import { blendPs } from "../model/blend.js";
+import { type Blended, blendPs } from "../model/blend.js";
 import { mostP } from "../model/exponent.js";
 import { short } from "../model/words.js";
 import { slider } from "./controls.js";
 import { pAt, shareOf } from "./dock.js";
-import { el, setText, toggle } from "./dom.js";
+import { el, setText } from "./dom.js";
+
+/** Less than this is not worth a word. */
+const leastSeconds = 5;
 
 /** One slider from paper to rubber. */
 export function blendPanel(app: App): HTMLElement {
   const blend = new Blend(app);
-  const status = el("p", { className: "quiet", role: "status" });
-  const said = el("p", { className: "quiet" });
-  const on = toggle(
-    "Prepare blending",
-    false,
-    (isOn) => blend.switch(isOn),
-    "Solves for several p while nothing else is done, in a session of its own",
-  );
+  const status = el("p", { className: "quiet" });
+  const said = el("p", { className: "quiet", role: "status" });
+  const say = (words: string) => {
+    setText(said, words);
+    status.hidden = words !== "";
+  };
   let p = app.document.p;
   const { element, show } = slider(
     "Blend p",
@@ -27,15 +28,11 @@ export function blendPanel(app: App): HTMLElement {
     (share) => {
       p = pAt(share);
       show(share, short(p));
-      const found = blend.show(p);
-      if (!found) return;
-      const { low, high } = found;
-      const between = `Interpolated between p = ${short(low)} and ${short(high)}; solved when you let go.`;
-      setText(said, low === high ? `Solved at p = ${short(low)}.` : between);
+      say(wordsOf(p, blend.show(p)));
     },
     () => {
       blend.release(p);
-      setText(said, "");
+      say("");
     },
   );
   element.title = "Passes through the shapes of all p at once, in the first picture";
@@ -48,17 +45,39 @@ export function blendPanel(app: App): HTMLElement {
     },
   );
   const showStatus = () => {
-    const { isOn, ready, fault } = blend.facts.now;
-    on.input.checked = isOn;
-    input.disabled = ready < 2;
-    element.classList.toggle("disabled", ready < 2);
     const { isAutomatic, handles } = app.document;
-    const waiting = isAutomatic ? "p comes from the shape: nothing is blended." : "There is no handle yet.";
-    const progress = ready < blendPs.length ? `${ready} of ${blendPs.length} shapes are ready.` : "All shapes are ready.";
-    const text = isAutomatic || handles.length === 0 ? waiting : fault ? `Not all is ready. ${fault}` : progress;
-    setText(status, isOn ? text : `One slider from paper (p = 1) to rubber (p = ${mostP}), without waiting for the solver.`);
+    input.disabled = isAutomatic || handles.length === 0;
+    element.classList.toggle("disabled", input.disabled);
+    setText(status, statusOf(app, blend));
   };
   blend.facts.watchAll(showStatus);
-  app.facts.watch(({ document }) => [document.isAutomatic, document.handles.length], showStatus);
-  return el("div", { className: "blend" }, status, on.element, element, said);
+  app.facts.watch(({ mesh, document }) => [mesh, document.isAutomatic, document.handles.length], showStatus);
+  const ends = el("p", { className: "ends quiet" }, el("span", {}, "paper, p = 1"), el("span", {}, `rubber, p = ${mostP}`));
+  return el("div", { className: "blend" }, element, ends, el("div", { className: "told" }, status, said));
+}
+
+function statusOf(app: App, blend: Blend): string {
+  const { isAutomatic, handles } = app.document;
+  const { waitsForUse, ready, secondsLeft, fault } = blend.facts.now;
+  if (isAutomatic) return "p comes from the shape: nothing is blended.";
+  if (handles.length === 0) return "There is no handle yet.";
+  if (fault) return `Not all is ready. ${fault}`;
+  const all = blendPs.length;
+  if (waitsForUse) {
+    const count = (app.mesh.positions.length / 3).toLocaleString("en");
+    return `Moving it has the server solve for ${all} values of p, which takes long with ${count} vertices.`;
+  }
+  if (ready === all) return "All shapes are ready.";
+  const isLong = secondsLeft !== undefined && secondsLeft >= leastSeconds;
+  return `${ready} of ${all} shapes are ready${isLong ? `, the others in about ${Math.ceil(secondsLeft)} s` : ""}.`;
+}
+
+/** For what is shown while the slider is at p. */
+function wordsOf(p: number, found: Blended | undefined): string {
+  if (!found) return "No shape is ready yet; solved when you let go.";
+  const { low, high } = found;
+  if (low < high) return `Interpolated between p = ${short(low)} and ${short(high)}; solved when you let go.`;
+  return low === p
+    ? `Solved at p = ${short(p)}.`
+    : `Shown at p = ${short(low)}, the nearest that is ready; solved when you let go.`;
 }

@@ -4,11 +4,10 @@ import { pressing, touches } from "../app/touch.js";
 import { elementsIn, isPassing, notAnswering, sentence, type Status } from "../link/status.js";
 import { capital, percent } from "../model/words.js";
 import { el, setText } from "./dom.js";
+import { startNotices } from "./notice.js";
 import { statusPill } from "./pill.js";
 import { pointOutNamed } from "./report.js";
 
-/** How long a line stays. */
-const noticeMs = 6000;
 /** How long the server may be away before a message appears. */
 const awayMs = 400;
 
@@ -30,12 +29,11 @@ export function messages(app: App, startOver: () => void): HTMLElement {
     show,
     again,
   );
-  const notice = el("div", { className: "notice", role: "status", hidden: true });
   const hint = el("div", { className: "hint" });
+  const notice = el("div", { className: "notice", role: "status", hidden: true });
   const restored = restoredNote(app, startOver);
   const aside = asideNote(app);
   let element = "";
-  let timer: ReturnType<typeof setTimeout> | undefined;
   let late: ReturnType<typeof setTimeout> | undefined;
   show.addEventListener("click", () => pointOutNamed(app, element));
   again.addEventListener("click", () => app.tryAgain());
@@ -65,7 +63,8 @@ export function messages(app: App, startOver: () => void): HTMLElement {
   };
   const showHint = () => {
     setText(hint, hintOf(app));
-    hint.hidden = app.isWatching || hint.textContent === "" || !banner.hidden || app.facts.now.restoredFrom !== undefined;
+    const isSaid = !banner.hidden || !notice.hidden || app.facts.now.restoredFrom !== undefined;
+    hint.hidden = app.isWatching || hint.textContent === "" || isSaid;
   };
   app.facts.watch(
     ({ status, problem }) => [status, problem],
@@ -78,34 +77,10 @@ export function messages(app: App, startOver: () => void): HTMLElement {
     },
   );
   app.facts.watch(({ document, canUndo, restoredFrom }) => [document.handles.length, canUndo, restoredFrom], showHint);
-  app.facts.watch(
-    ({ notice }) => [notice],
-    ([now]) => {
-      clearTimeout(timer);
-      notice.hidden = now === undefined;
-      if (!now) return;
-      notice.textContent = now.text;
-      notice.classList.toggle("bad", now.isBad);
-      if (!now.stays) timer = setTimeout(() => (notice.hidden = true), now.isBad ? 2 * noticeMs : noticeMs);
-    },
-  );
   app.view.watchAll(showHint);
-  makeWay(app, notice);
+  startNotices(app, notice, showHint);
   app.stages.addEventListener("pointerdown", () => aside.classList.add("small"), { capture: true });
   return el("div", { className: "messages" }, pill.element, banner, hint, restored, aside, betterButton(app), notice);
-}
-
-/** Lets no notice lie over what is dragged in a picture: a press ends it, or hides it for so long if it has still to be read. */
-function makeWay(app: App, notice: HTMLElement): void {
-  const hide = (isHidden: boolean) => notice.classList.toggle("makes-way", isHidden);
-  const press = () => {
-    const { notice: now } = app.facts.now;
-    if (now && !now.isBad && !now.stays) app.facts.set({ notice: undefined });
-    hide(true);
-  };
-  // Before the picture has the event: its press may make a notice of its own.
-  app.stages.addEventListener("pointerdown", press, { capture: true });
-  for (const end of ["pointerup", "pointercancel"]) window.addEventListener(end, () => hide(false), { capture: true });
 }
 
 /** There while the server knows a shape of lower energy; takes those of all panes. */

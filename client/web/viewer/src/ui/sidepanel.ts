@@ -15,9 +15,9 @@ export function sidePanel(app: App): HTMLElement {
     "aside",
     { className: "panel", aria: { label: "Side panel" } },
     section("Handles", handlesPanel(app), true),
+    section("Blend through p", blendPanel(app), true),
     section("Poses", posesPanel(app), false),
     section("Look", lookPanel(app), true),
-    section("Blend through p", blendPanel(app), false),
     numbers,
     mesh,
   );

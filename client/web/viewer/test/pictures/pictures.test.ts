@@ -4,6 +4,7 @@ import { join } from "node:path";
 import { afterAll, beforeAll, it } from "vitest";
 import { openSession } from "../../../client/src/index.js";
 import { Service } from "../../../client/test/support/service.js";
+import { ringObj } from "../support/ring.js";
 import { sizes } from "../support/sizes.js";
 import { User } from "../real/user.js";
 
@@ -238,9 +239,7 @@ const tools: readonly State[] = [
     query: "?shape=bar",
     act: async (user) => {
       await pull(user, "Top", 150, 130);
-      await user.page.getByText("Blend through p").click();
-      await user.page.getByRole("checkbox", { name: "Prepare blending" }).setChecked(true, { force: true });
-      await user.page.getByRole("slider", { name: "Blend p" }).and(user.page.locator(":enabled")).waitFor({ timeout: 60_000 });
+      await user.page.getByText("All shapes are ready.").waitFor({ timeout: 60_000 });
     },
   },
   {
@@ -355,10 +354,18 @@ const troubles: readonly State[] = [
       await user.settled();
     },
   },
+  {
+    name: "opened",
+    act: async (user) => {
+      await user.openFiles({ name: "a ring of a model.obj", content: ringObj(60, 30) });
+      await user.page.locator(".notice", { hasText: "a ring of a model.obj" }).waitFor();
+    },
+  },
   { name: "help", act: (user) => user.page.getByRole("button", { name: "Help and shortcuts (?)" }).click() },
   { name: "warnings", act: openWithDefects },
 ];
 const narrow = { width: 420, height: 860, hasTouch: true };
+const low = { width: 740, height: 360, hasTouch: true };
 const atBothSizes = troubles.flatMap((state) => [
   { ...state, isLight: state.name.length % 2 === 0 },
   { ...state, name: `upright-${state.name}`, size: upright, isLight: state.name.length % 2 === 1 },
@@ -366,8 +373,11 @@ const atBothSizes = troubles.flatMap((state) => [
 
 /** A window or a telephone that is narrower still. */
 const inLittleRoom = troubles
-  .filter(({ name }) => ["away", "made-room", "help"].includes(name))
-  .map((state) => ({ ...state, name: `narrow-${state.name}`, size: narrow }));
+  .filter(({ name }) => ["away", "made-room", "opened", "help"].includes(name))
+  .flatMap((state) => [
+    { ...state, name: `narrow-${state.name}`, size: narrow },
+    { ...state, name: `low-${state.name}`, size: low },
+  ]);
 
 it.each([...states, ...tools, ...bySize, ...atBothSizes, ...inLittleRoom].filter(({ name }) => only.test(name)))(
   "$name",

@@ -10,20 +10,24 @@ beforeEach(async () => {
   const [vertex] = await user.ask<number[]>("document().handles[1].vertices");
   await user.drag(await user.vertexOnPage(vertex!), 120, 60);
   await user.settled();
-  await user.page.getByText("Blend through p").click();
 });
 
-const status = () => user.page.locator(".blend [role=status]");
+const status = () => user.page.locator(".blend .quiet").nth(1);
 const blend = () => user.page.getByRole("slider", { name: "Blend p" });
-const prepare = () => user.page.getByRole("checkbox", { name: "Prepare blending" }).setChecked(true, { force: true });
+const allReady = () => status().filter({ hasText: "All shapes are ready." }).waitFor({ timeout: 60_000 });
+const fewReady = () =>
+  status()
+    .filter({ hasText: /^\d+ of 12 shapes are ready/ })
+    .waitFor();
+/** The number of the newest change that the work's own session was asked for. */
+const sent = () => user.ask<number>("app.panes[0].live.newestInput");
 const shown = () => user.page.evaluate<number[]>("[...window.__lpdeform.app.panes[0].stage.surface.positions]");
 const far = (a: readonly number[], b: readonly number[]) => Math.max(...a.map((value, k) => Math.abs(value - b[k]!)));
 
-it("a slider passes through prepared shapes, says which are interpolated, and is solved when it is let go", async () => {
-  expect(await blend().isDisabled()).toBe(true);
-  await prepare();
-  await status().filter({ hasText: "All shapes are ready." }).waitFor({ timeout: 60_000 });
-  const before = await shown();
+it("with nothing pressed, a slider passes through prepared shapes without a solve, says which are interpolated, and is solved when it is let go", async () => {
+  expect(await blend().isVisible()).toBe(true);
+  await allReady();
+  const [before, asked] = [await shown(), await sent()];
   const said = user.page.locator(".blend p").last();
   const move = (p: number) =>
     blend().evaluate(
@@ -41,6 +45,7 @@ it("a slider passes through prepared shapes, says which are interpolated, and is
   await move(4.9);
   expect(await said.textContent()).toBe("Interpolated between p = 4 and 6; solved when you let go.");
   const at5 = await shown();
+  expect(await sent()).toBe(asked);
   await blend().dispatchEvent("change");
   await user.until("window.__lpdeform.document().p === 4.9");
   await user.settled();
@@ -52,16 +57,31 @@ it("a slider passes through prepared shapes, says which are interpolated, and is
 });
 
 it("shapes of other work are dropped, and prepared again", async () => {
-  await prepare();
-  await status().filter({ hasText: "All shapes are ready." }).waitFor({ timeout: 60_000 });
+  await allReady();
   await user.page.getByRole("textbox", { name: "Moved along x", exact: true }).fill("0.2");
   await user.page.keyboard.press("Enter");
-  await user.until("document.querySelector('.blend input[type=range]').disabled");
-  await status().filter({ hasText: "All shapes are ready." }).waitFor({ timeout: 60_000 });
+  await fewReady();
+  await allReady();
   await user.ask("app.view.set({ weldTolerance: 1e-4 })"); // other vertices count as one
-  await user.until("document.querySelector('.blend input[type=range]').disabled");
-  await status().filter({ hasText: "All shapes are ready." }).waitFor({ timeout: 60_000 });
+  await fewReady();
+  await allReady();
   await user.page.locator("canvas.stage").focus();
   await user.page.keyboard.press("a");
   await status().filter({ hasText: "p comes from the shape" }).waitFor();
+  expect(await blend().isDisabled()).toBe(true);
+});
+
+it("the session for it is there while it solves, and ends with the last shape and when the page is hidden", async () => {
+  const calls: string[] = [];
+  user.page.on("request", (request) => calls.push(new URL(request.url()).pathname.split("/").at(-1)!));
+  const count = (name: string) => calls.filter((call) => call === name).length;
+  await allReady();
+  await expect.poll(() => count("DeleteSession"), { timeout: 20_000 }).toBe(1);
+  await user.ask("app.view.set({ weldTolerance: 1e-4 })");
+  await expect.poll(() => count("CreateSession"), { timeout: 20_000 }).toBe(2);
+  await user.page.evaluate(() => {
+    Object.defineProperty(document, "visibilityState", { value: "hidden", configurable: true });
+    document.dispatchEvent(new Event("visibilitychange"));
+  });
+  await expect.poll(() => count("DeleteSession"), { timeout: 20_000 }).toBe(2);
 });

@@ -1,4 +1,6 @@
+import { readFileSync } from "node:fs";
 import { join } from "node:path";
+import { gunzipSync } from "node:zlib";
 import { afterAll, beforeAll, expect, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
 import { ringObj, ringVertex } from "../support/ring.js";
@@ -148,6 +150,48 @@ it("names what is wrong with a large file that a worker reads", async () => {
   await user.settled();
   await user.openFiles({ name: "ring.obj", content: `${ringObj(around, across)}f 1 2 99999\n` });
   await user.page.getByText(`face ${2 * around * across + 1} has the corner “99999”`).waitFor();
+  expect(user.errors).toEqual([]);
+  await user.close();
+});
+
+it("has all of a stroke of the p brush in a project that is saved in the middle of it, and in work that is set aside for a mesh", async () => {
+  const user = await User.open(`${service.url}/?shape=sheet&detail=coarse`);
+  const onRing = await openRing(user);
+  await user.page.keyboard.press("e");
+  await user.ask("app.view.set({ radius: 0.02 })");
+  const painted = "[...(window.__lpdeform.document().paintedP ?? [])].filter((value) => !Number.isNaN(value)).length";
+  /** Moves the pointer, and does something else before the place is painted. Returns how many vertices are painted by then. */
+  const moveAnd = (to: { x: number; y: number }, act: string) =>
+    user.page.evaluate<number>(`(() => {
+      const at = { clientX: ${to.x}, clientY: ${to.y}, pointerId: 1, buttons: 1, bubbles: true };
+      document.querySelector("canvas.stage").dispatchEvent(new PointerEvent("pointermove", at));
+      const before = ${painted};
+      ${act};
+      return before;
+    })()`);
+  const [from, to, next] = await Promise.all([onRing(0.74), onRing(0.76), onRing(0.78)]);
+  await user.page.mouse.move(from.x, from.y);
+  await user.page.mouse.down();
+  await user.until(`${painted} > 0`);
+  const first = await user.page.evaluate<number>(painted);
+  const download = user.page.waitForEvent("download");
+  const save = `document.body.dispatchEvent(new KeyboardEvent("keydown", { key: "s", ctrlKey: true, bubbles: true }))`;
+  expect(await moveAnd(to, save)).toBe(first);
+  const line = gunzipSync(readFileSync(await (await download).path()))
+    .toString("latin1")
+    .split("\n", 1)[0]!;
+  const { groups } = JSON.parse(line).handles as { groups: { vertices: number[] }[] };
+  const saved = groups.reduce((sum, { vertices }) => sum + vertices.length, 0);
+  expect(saved).toBeGreaterThan(first);
+  expect(saved).toBe(await user.page.evaluate(painted));
+
+  expect(await moveAnd(next, `window.__lpdeform.app.openShape("bar", "coarse")`)).toBe(saved);
+  await user.page.mouse.up();
+  await user.settled();
+  expect(await user.page.evaluate(painted)).toBe(0);
+  await user.page.getByRole("button", { name: "Bring it back" }).click();
+  await user.until(`window.__lpdeform.app.mesh.name === "ring.obj"`);
+  expect(await user.page.evaluate(painted)).toBeGreaterThan(saved);
   expect(user.errors).toEqual([]);
   await user.close();
 });

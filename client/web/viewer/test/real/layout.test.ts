@@ -31,7 +31,7 @@ const states = [false, true].flatMap((isSplit) =>
 );
 
 /** Where room is little, these leave the pictures free. */
-const beside = [".topbar", ".rail", ".options", ".dock", ".panel", ".hint", ".legend"];
+const beside = [".topbar", ".rail", ".options", ".dock", ".panel", ".hint", ".legend", ".notice"];
 const isTelephone = (width: number, height: number) => (width <= 720 && width <= height) || (height <= 560 && height <= width);
 const isLittle = (width: number, height: number) =>
   isTelephone(width, height) || (width <= 900 && height <= 900) || (width <= 1000 && height <= 600);
@@ -65,7 +65,7 @@ const messages = {
   ],
   better: [0.07, 0.12],
   notice: {
-    text: "my tube.glb: 221 vertices, 17 of them copies along seams, welded: the panel has a switch.",
+    text: "my tube.glb: 221 vertices, 17 of them copies along seams, welded: the panel “Mesh” has a switch. Shown with z up, as it seems: “Y is up” in the panel turns it.",
     isBad: true,
     stays: true,
   },
@@ -121,7 +121,9 @@ function covering(): string[] {
       found.push(`the shape is small in ${k}`);
     if (shape.left < pane.left || shape.right > pane.right || shape.top < pane.top || shape.bottom > pane.bottom)
       found.push(`the shape is cut off in ${k}`);
-    for (const part of document.querySelectorAll(".hint, .legend, .pill, .rail, .options, .dock, .split ~ .dock > *")) {
+    for (const part of document.querySelectorAll(
+      ".notice, .hint, .legend, .pill, .rail, .options, .dock, .split ~ .dock > *",
+    )) {
       const box = part.getBoundingClientRect();
       const within = (place: { x: number; y: number }) =>
         place.x > box.left && place.x < box.right && place.y > box.top && place.y < box.bottom;
@@ -130,6 +132,17 @@ function covering(): string[] {
     }
   });
   return found;
+}
+
+/** Messages whose shadows end before the window does. */
+function cutShadows(): string[] {
+  const blur = 28;
+  const { left, right } = document.querySelector(".messages")!.getBoundingClientRect();
+  return [...document.querySelectorAll<HTMLElement>(".banner, .restored, .aside, .better")].flatMap((element) => {
+    const box = element.getBoundingClientRect();
+    const isWhole = left <= Math.max(box.left - blur, 0) && right >= Math.min(box.right + blur, innerWidth);
+    return isWhole ? [] : [`the shadow of ${element.className} is cut off`];
+  });
 }
 
 /** Choices that are wider than their list is, by name. */
@@ -172,6 +185,39 @@ it.each(sizes)(
         await drawn(user);
         const all = await user.page.evaluate(covering);
         if (all.length > 0) found[`${shape}, ${isSplit ? "two pictures" : "one"}`] = all;
+      }
+    }
+    expect(found).toEqual({});
+  },
+);
+
+/**
+ * Here the panel leaves two pictures too little: at the first size a long notice leaves no room for shape and pill, and at the second
+ * the sliders lie over the shapes without a notice, too.
+ */
+const areTooSmallForTwo = ["360 x 640", "768 x 1024"];
+
+it.each(sizes)(
+  "a notice covers neither the shape nor a control at %d x %d, with the panel and without",
+  async (width, height) => {
+    await user.page.setViewportSize({ width, height });
+    const found: Record<string, string[]> = {};
+    for (const isPanelOpen of [false, true]) {
+      for (const isSplit of [false, true]) {
+        await user.ask(`app.view.set({ isSplit: ${isSplit}, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
+        await user.ask(`app.startOver("creature", "coarse")`);
+        await user.until("window.__lpdeform.app.panes.every(({ stage }) => stage.surface)");
+        await drawn(user);
+        const { notice } = messages;
+        await user.page.evaluate(([notice]) => (window as any).__lpdeform.app.facts.set({ notice }), [notice]);
+        await drawn(user);
+        const isTooSmall = isSplit && isPanelOpen && areTooSmallForTwo.includes(`${width} x ${height}`);
+        const all = [
+          ...(isTooSmall ? [] : await user.page.evaluate(covering)),
+          ...(await user.page.evaluate(faults, [parts, isLittle(width, height) ? beside : []])),
+        ];
+        if (all.length > 0) found[`${isSplit ? "two pictures" : "one"}, panel ${isPanelOpen ? "open" : "closed"}`] = all;
+        await user.ask("app.facts.set({ notice: undefined })");
       }
     }
     expect(found).toEqual({});
@@ -242,7 +288,10 @@ it.each(cases)("nothing covers anything at %d x %d under %s", async (width, heig
     );
     await one.page.locator(".banner").waitFor();
     await drawn(one);
-    const all = await one.page.evaluate(faults, [parts, []]);
+    const all = [
+      ...(await one.page.evaluate(faults, [parts, isLittle(width, height) ? [".notice"] : []])),
+      ...(await one.page.evaluate(cutShadows)),
+    ];
     if (all.length > 0) found[`all messages, panel ${isPanelOpen ? "open" : "closed"}`] = all;
     await one.page.evaluate(
       ([nothing, status]) =>
@@ -271,4 +320,44 @@ it.each([
     const wanted = first!.y === second!.y ? ["left", "right"] : ["upper", "lower"];
     expect(await user.page.locator(".p-name small").allTextContents()).toEqual(wanted);
   }
+});
+
+it("a picture keeps its size while it is pressed, whatever is said meanwhile", async () => {
+  await user.page.setViewportSize({ width: 390, height: 844 });
+  await user.ask(`app.view.set({ isSplit: false, isPanelOpen: false, tool: "move" })`);
+  const height = async () => (await drawn(user), (await user.page.locator("canvas.stage").boundingBox())!.height);
+  const say = (isBad: boolean) =>
+    user.page.evaluate(([text, isBad]) => (window as any).__lpdeform.app.facts.set({ notice: { text, isBad } }), [
+      messages.notice.text,
+      isBad,
+    ] as const);
+  const alone = await height();
+  await say(false);
+  const beside = await height();
+  expect(beside).toBeLessThan(alone);
+  await user.page.mouse.move(40, 300);
+  await user.page.mouse.down();
+  expect(await user.page.locator(".notice").isVisible()).toBe(false);
+  expect(await height()).toBe(beside);
+  await user.page.mouse.up();
+  expect(await height()).toBe(alone);
+  await user.page.mouse.down();
+  await say(true);
+  expect(await height()).toBe(alone);
+  await user.page.mouse.up();
+  expect(await height()).toBe(beside);
+  expect(await user.page.locator(".notice").isVisible()).toBe(true);
+  await user.ask("app.facts.set({ notice: undefined })");
+});
+
+it("the shape is fitted again when the panel opens after the first drag", async () => {
+  const fresh = await User.open(`${service.url}/?shape=creature&detail=coarse`, { width: 820, height: 1180, hasTouch: true });
+  await fresh.settled();
+  const [vertex] = await fresh.ask<number[]>(`document().handles.find(({ name }) => name === "Head").vertices`);
+  await fresh.drag(await fresh.vertexOnPage(vertex!), -90, -60);
+  await fresh.settled();
+  await fresh.page.getByRole("button", { name: "Side panel" }).click();
+  await drawn(fresh);
+  expect(await fresh.page.evaluate(covering)).toEqual([]);
+  await fresh.close();
 });

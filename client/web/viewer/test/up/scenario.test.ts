@@ -193,12 +193,14 @@ describe("somebody with a mesh of their own", () => {
     expect(largestDifference(await user.positions(), [...tower.positions])).toBeGreaterThan(1);
 
     const numbers = fromPly(exported);
-    const upload = user.page.waitForRequest((request) => request.url().endsWith("/CreateSession"));
-    await user.openFiles({ name: "bent.ply", content: exported });
-    await user.until("window.__lpdeform.app.mesh.name === 'bent.ply'");
     // The numbers that the server sent go back to it to the last bit, and come back from it for what nothing holds.
     const bytes = Buffer.from(new Uint8Array(Float64Array.from(numbers).buffer));
-    expect((await upload).postDataBuffer()!.includes(bytes)).toBe(true);
+    const upload = user.page.waitForRequest(
+      (request) => request.url().endsWith("/CreateSession") && request.postDataBuffer()!.includes(bytes),
+    );
+    await user.openFiles({ name: "bent.ply", content: exported });
+    await user.until("window.__lpdeform.app.mesh.name === 'bent.ply'");
+    await upload;
     await user.settled();
     expect(largestDifference(await user.positions(), numbers)).toBeLessThan(1e-3);
     expect(fromPly(await user.save("Mesh as PLY, with distortion"))).toEqual(numbers);
