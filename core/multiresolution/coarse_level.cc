@@ -135,8 +135,8 @@ std::optional<CoarseMotion> CoarseLevel::lead(const FineInputs& fine, const Poin
   while (solver_->step()) {
   }
   CoarseMotion motion;
-  motion.positions = carried(from ? *from : fine.shape.scaled_positions(), before, pose(fine.shape),
-                             workers, &motion.turns);
+  motion.positions =
+      carried(from ? *from : fine.shape.scaled_positions(), before, pose(fine.shape), workers, &motion.turns);
   return motion;
 }
 

@@ -14,6 +14,7 @@
 namespace lpdeform {
 namespace {
 
+constexpr int kMostTogether = 12;            // fine iterations after a coarse level's, for which it leads on
 constexpr double kCertificateSeconds = 1;    // it may take this long, even beyond the time limit
 constexpr std::size_t kCopyChunk = 4096;     // vertices
 constexpr std::int32_t kLargeAtTwo = 10000;  // the same if every p is 2, where the gain is smaller
@@ -311,6 +312,9 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   objective.reweigh(*norm);  // typical_energy has evaluated the guess
   best_sum = std::numeric_limits<double>::infinity();
   minimiser = make_minimiser(settings.method, std::move(guess), warmth);
+  // Also before the first step: the next move may come sooner.
+  if (settings.method == Method::kMultiresolution) lead = Lead::kAhead;
+  fine_iterations = 0;
   factor = settings.method == Method::kQuasiNewton ? Factor::kQuasiNewton : Factor::kUsable;
   const double sum = objective.sum(*norm);
   keep_if_best(sum);
@@ -324,7 +328,10 @@ void Deformer::Impl::iterate() {
   if (search) return search_on();
   const StepResult result = minimiser->step();
   const bool is_ahead = settings.method == Method::kMultiresolution && result.stage == 0;
-  if (settings.method == Method::kMultiresolution) lead = is_ahead ? Lead::kAhead : Lead::kTogether;
+  if (!is_ahead) ++fine_iterations;
+  // After many iterations x has come far from the coarse level's first shape. A drag that it has led goes on together.
+  if (settings.method == Method::kMultiresolution)
+    lead = is_ahead ? Lead::kAhead : fine_iterations > kMostTogether ? Lead::kNone : Lead::kTogether;
   double sum = result.true_sum ? *result.true_sum : objective.sum(*norm);
   keep_if_best(sum);
   const bool is_over = result.outcome == Outcome::kConverged || result.outcome == Outcome::kStalled;

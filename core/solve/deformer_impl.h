@@ -156,6 +156,7 @@ struct Deformer::Impl {
   };
   Lead lead = Lead::kNone;
   std::unique_ptr<Minimiser> minimiser;
+  int fine_iterations = 0;                   // of the running solve
   std::unique_ptr<MinimaSearch> search;      // runs after the minimiser has ended
   bool is_search_apart = false;              // its result goes to `better`, not to x
   int search_stage = 0;                      // of its records

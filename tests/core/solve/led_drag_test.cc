@@ -49,6 +49,13 @@ TEST_P(LedDragTest, KeepsNearTheMinimum) {
   EXPECT_LE(above_minimum(last), GetParam() == 6 ? 1.6 : 1.2);
 }
 
+/// On a slow machine each move may come before the first iteration of the one before. Without what the coarse level finds for the first
+/// move, it is 2.8, 2.8 and 3.4 times the minimum.
+TEST_P(LedDragTest, KeepsNearTheMinimumAlsoWithoutAnyIteration) {
+  for (int number = 1; number < 12; ++number) (void)move(number, 0);
+  EXPECT_LE(above_minimum(move(12, 0)), GetParam() == 6 ? 3 : 1.4);
+}
+
 TEST_P(LedDragTest, FramesDoNotJump) {
   Points before;
   double farthest = 0, of_handle = 0;
@@ -66,6 +73,21 @@ TEST_P(LedDragTest, FramesDoNotJump) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Norms, LedDragTest, testing::Values(1.5, 2.0, 6.0));
+
+class LedDragOfLowPTest : public LedDragTest {};
+
+/// With coarse levels that start anew after a dozen fine iterations, it is 1.33 and 1.20 times.
+TEST_P(LedDragOfLowPTest, BeginsNearTheMinimumWhereMovesHaveTime) {
+  for (int number = 1; number < 10; ++number) (void)move(number, 20);
+  double most = 0;
+  for (int number = 10; number <= 12; ++number) {
+    const SolveSummary summary = move(number, 20);
+    most = std::max(most, std::pow(summary.initial_energy / summary.energy, 1 / GetParam()));
+  }
+  EXPECT_LE(most, 1.1);
+}
+
+INSTANTIATE_TEST_SUITE_P(LowNorms, LedDragOfLowPTest, testing::Values(1.5, 2.0));
 
 class LedDragAtTwoTest : public LedDragTest {};
 
