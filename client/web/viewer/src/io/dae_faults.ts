@@ -1,4 +1,4 @@
-import { type Faces, isFaces, isVertex, readFaces } from "./dae_polygons.js";
+import { type Faces, isFaces, isVertex, readFaces, type Source } from "./dae_polygons.js";
 import { checkCopies, type Use } from "./uses.js";
 import { child, childrenOf, type Element, elementsIn, isNumber, wordsOf, XmlText } from "./xml.js";
 
@@ -103,13 +103,6 @@ function checkReference(xml: XmlText, { name, attributes, at }: Element, named: 
     const kind = target.children[0] ? `a <${target.children[0].name}>` : "nothing";
     throw xml.fault(target.at, `the geometry “${idOf(target)}” has ${kind} in place of a <mesh>`);
   }
-}
-
-export interface Source {
-  /** Of points, or whatever it has. */
-  count: number;
-  /** How many numbers each has. */
-  stride: number;
 }
 
 type Sources = ReadonlyMap<string | undefined, Source>;

@@ -1,5 +1,4 @@
 import type { FileFault } from "lpdeform-client/mesh/fault";
-import type { Source } from "./dae_faults.js";
 import { child, childrenOf, type Element, wordsOf, type XmlText } from "./xml.js";
 
 // The elements of a COLLADA mesh that have faces. What is wrong in them is refused by its line.
@@ -14,6 +13,13 @@ const kinds: Readonly<Record<string, "polygon" | "strip" | "fan">> = {
 };
 
 export const isFaces = ({ name }: Element): boolean => Object.hasOwn(kinds, name);
+
+export interface Source {
+  /** Of points, or whatever it has. */
+  count: number;
+  /** How many numbers each has. */
+  stride: number;
+}
 
 export interface FaceInput {
   element: Element;
