@@ -121,16 +121,13 @@ void Metric::adopt(const std::vector<double>& cell_weights) {
 
 void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
                     const Points* forces) const {
-  Points b = Points::Zero(u.rows(), 3);
-  for (std::int32_t i = 0; i < shape_->vertex_count(); ++i) {
-    if (is_held[i]) {
-      b.row(i) = u.row(i);
-      continue;
-    }
-    if (forces != nullptr) b.row(i) = forces->row(i) / scale_;
-    for (std::int32_t k = shape_->offsets()[i]; k < shape_->offsets()[i + 1]; ++k) {
-      const std::int32_t j = shape_->neighbours()[k];
-      if (is_held[j]) b.row(i) += edge_weight(i, k) * u.row(j);
+  Points b = forces != nullptr ? Points(*forces / scale_) : Points(Points::Zero(u.rows(), 3));
+  for (std::int32_t j = 0; j < shape_->vertex_count(); ++j) {
+    if (!is_held[j]) continue;
+    b.row(j) = u.row(j);
+    for (std::int32_t k = shape_->offsets()[j]; k < shape_->offsets()[j + 1]; ++k) {
+      const std::int32_t i = shape_->neighbours()[k];
+      if (!is_held[i]) b.row(i) += edge_weight(j, k) * u.row(j);
     }
   }
   solve_single(b, u, workers);
