@@ -237,7 +237,8 @@ const Points& Deformer::positions() const {
 
 std::vector<Eigen::Matrix3d> Deformer::rotations() {
   Impl& self = *impl_;
-  if (self.minimiser || self.search || self.certificate) {  // these own the objective's evaluation
+  if (self.minimiser || self.search ||
+      self.certificate) {  // a look at a running solve, whose evaluation stays
     CellPass cells(self.shape, self.workers());
     cells.evaluate(self.x, self.even_norm());
     return cells.rotations();

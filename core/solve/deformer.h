@@ -122,7 +122,7 @@ class Deformer {
   /// The best state of the running or the last solve, in the caller's units and vertex order; always finite.
   /// The rest positions before the first solve.
   const Points& positions() const;
-  /// R_i at positions(). Takes as long as an iteration.
+  /// R_i at positions(), also of a running solve. Takes as long as an iteration.
   std::vector<Eigen::Matrix3d> rotations();
   /// E_i at positions(), in the caller's unit of length; 0 for unreferenced vertices.
   const Field& cell_energies() const;

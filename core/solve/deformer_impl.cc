@@ -329,9 +329,11 @@ void Deformer::Impl::iterate() {
   const StepResult result = minimiser->step();
   const bool is_ahead = settings.method == Method::kMultiresolution && result.stage == 0;
   if (!is_ahead) ++fine_iterations;
-  // After many iterations x has come far from the coarse level's first shape. A drag that it has led goes on together.
-  if (settings.method == Method::kMultiresolution)
-    lead = is_ahead ? Lead::kAhead : fine_iterations > kMostTogether ? Lead::kNone : Lead::kTogether;
+  if (is_ahead)
+    lead = Lead::kAhead;
+  else if (settings.method ==
+           Method::kMultiresolution)  // after many iterations x has left the coarse level's shape
+    lead = fine_iterations > kMostTogether ? Lead::kNone : Lead::kTogether;
   double sum = result.true_sum ? *result.true_sum : objective.sum(*norm);
   keep_if_best(sum);
   const bool is_over = result.outcome == Outcome::kConverged || result.outcome == Outcome::kStalled;

@@ -167,7 +167,8 @@ TEST_F(SmallServerTest, AFullServerSaysWhenToTryAgain) {
   const ErrorDetails details = details_of(status);
   EXPECT_EQ(details.info.reason(), "SESSIONS_FULL");
   ASSERT_TRUE(details.retry.has_value());
-  EXPECT_GT(details.retry->retry_delay().seconds(), 0);
+  EXPECT_GE(details.retry->retry_delay().seconds(), 5);
+  EXPECT_LE(details.retry->retry_delay().seconds(), 15);
   ASSERT_TRUE(details.quota.has_value());
   EXPECT_EQ(details.quota->violations(0).subject(), "sessions");
 }
