@@ -51,12 +51,22 @@ describe("elements with a prefix", () => {
     expect(await glbOf(empty)).toEqual(wanted);
   });
 
-  it("that is bound to something else, or to nothing, are left out with all that is in them", async () => {
+  it("that is bound to something else are left out with all that is in them", async () => {
     const other = `<x:triangles xmlns:x="urn:x" count="many"><x:p>a</x:p>\n<triangles count="7"/></x:triangles>`;
     expect(await glbOf(but(dae, "<triangles", `${other}<triangles`))).toEqual(wanted);
-    expect(await glbOf(but(dae, "<triangles", "<y:extra/><triangles"))).toEqual(wanted);
+    expect(await glbOf(but(dae, "<triangles", '<xml:extra/><x:extra xmlns:x="urn:x"/><triangles'))).toEqual(wanted);
     const again = `<c:extra xmlns:c="urn:x"><c:a/></c:extra>`; // within, the prefix is another's
     expect(await glbOf(but(prefixed(dae, "c"), "<c:triangles", `${again}<c:triangles`))).toEqual(wanted);
+  });
+
+  it("that nothing declares are refused by their line", async () => {
+    const undeclared = "a.dae, line 17: <y:triangles> has the prefix “y”, which nothing declares.";
+    const own = but(dae, "<triangles", "<y:triangles").replace("</triangles>", "</y:triangles>");
+    expect(await refusalOf(own)).toBe(undeclared);
+    expect(await refusalOf(but(own, "<COLLADA ", '<COLLADA xmlns:y="" '))).toBe(undeclared);
+    expect(await refusalOf(but(own, "<asset>", `<y:extra xmlns:y="${address}"/><asset>`))).toBe(undeclared);
+    const inner = but(dae, "<triangles", '<x:a xmlns:x="urn:x"><y:b/></x:a><triangles');
+    expect(await refusalOf(inner)).toBe("a.dae, line 17: <y:b> has the prefix “y”, which nothing declares.");
   });
 
   it("are refused by their line as others are, and by the prefix if the file begins with another's", async () => {
