@@ -269,6 +269,15 @@ describe("corners keep their normals, texture coordinates and colours, and faces
     expect(["blue", "red"]).not.toContain(all[0]!.material);
   });
 
+  it("also beside elements without faces, which have none", async () => {
+    const full = other("polygons", "red", 0, 1, 2, 3);
+    const empty = ["triangles", "polygons"].map((name) => element(name, 0, name === "triangles" ? "<p/>" : "")).join("");
+    expect(await primitivesOf(rich(empty + full))).toEqual(await primitivesOf(rich(full)));
+    expect(await primitivesOf(rich(full + empty))).toEqual(await primitivesOf(rich(full)));
+    const plain = triangles("red", 0, 1, 2);
+    expect(await primitivesOf(rich(plain + element("triangles", 0, "<p/>")))).toEqual(await primitivesOf(rich(plain)));
+  });
+
   it("unless only some faces have them, and then the page says so", async () => {
     const plain = `<trifans count="1">${vertexInput}<p>0 1 13</p></trifans>`;
     const made = await primitivesOf(rich(other("polygons", "red", 0, 1, 2, 3) + plain));

@@ -22,11 +22,13 @@ export function withTriangles(name: string, text: string, meshes: readonly DaeMe
   const most = { triangles: mostTriangles, work: mostWork };
   let end = 0;
   for (const mesh of meshes) {
-    const { kept, isLost } = keptKeys(mesh.faces, left);
-    const materials = mesh.faces.map(({ element }) => element.attributes["material"]);
+    const filled = mesh.faces.filter(({ indices }) => indices.length > 0);
+    const { kept, isLost } = keptKeys(filled, left);
+    const materials = filled.map(({ element }) => element.attributes["material"]);
     const isPlain = mesh.faces.every(({ element }) => element.name === "triangles");
     const isAlike = materials.every(Boolean) || !materials.some(Boolean);
-    if (isPlain && isAlike && !isLost) continue;
+    const hasEmpty = filled.length < mesh.faces.length;
+    if (isPlain && isAlike && !isLost && !hasEmpty) continue;
     for (const faces of mesh.faces) {
       if (faces.element.at < end) continue; // it stands in other faces, where the reader does not look
       const corners = cornersOf(mesh, faces, most);
