@@ -157,14 +157,26 @@ it.each<[string, string]>([
     `, line 18: ${own} 0 with 4 indices, which is no multiple of the 3 of a`,
   ],
   [plate(outline).replace('offset="0"', 'offset="99999999999999999999"'), " with 4 indices, which is no multiple of the 1"],
-  [plate(`<p>${"0 1 2 3 ".repeat(5001)}</p>`), `, line 18: ${own} 0 with 20004 corners; this page reads 20000 at most.`],
+  [plate(`<p>${"0 1 2 3 ".repeat(2501)}</p>`), `, line 18: ${own} 0 with 10004 corners; this page reads 10000 at most.`],
   [
-    plate(`<p>${"0 1 ".repeat(10_000)}</p>\n`.repeat(2), 2),
+    plate(`<p>${"0 1 ".repeat(5000)}</p>\n`.repeat(2), 2),
     `, line 19: ${own} 1 after so many large ones that reading them takes too long.`,
   ],
 ])("wrong polygons are refused by their line (%#)", async (content, words) => {
   expect(await refusalOf(content)).toContain(`a.dae${words}`.slice(words.startsWith(",") ? 0 : 5));
 });
+
+it("polygons of many corners are refused early if they cross themselves", async () => {
+  const round = Array.from({ length: 3000 }, (_, k) => [Math.cos((2 * Math.PI * k) / 3000), Math.sin((2 * Math.PI * k) / 3000), 0]);
+  const places = round.flat();
+  const text = dae.replace(/(<float_array[^>]*count=")\d+(">)[^<]*/, `$1${places.length}$2${places.join(" ")}`);
+  const polygons = (step: number, count: number) => {
+    const list = `<p>${round.map((_, k) => (k * step) % 3000).join(" ")}</p>\n`;
+    return faces(element("polygons", count, list.repeat(count)), text);
+  };
+  expect((await meshOf(polygons(1, 20))).faces.length / 3).toBe(20 * 2998);
+  expect(await refusalOf(polygons(1409, 20))).toMatch(/has a polygon 6 after so many large ones that reading them takes too long\.$/);
+}, 60_000);
 
 it.each<[string, string]>([
   ["tristrips", "strip"],

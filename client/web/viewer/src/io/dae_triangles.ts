@@ -8,8 +8,10 @@ import { triangulated } from "./triangulate.js";
 
 /** A page can handle no more. */
 const mostTriangles = 5_000_000;
-/** Of one polygon, and the sum of squares: so much time may the polygons of a file take. */
-const [mostCorners, mostWork] = [20_000, 5e8];
+/** Of one polygon, and the sum of squares: the polygons of a file take some 5 seconds at most. */
+const [mostCorners, mostWork] = [10_000, 5e8];
+/** A polygon that crosses itself takes about so many times as long as another one. From `fewCorners` on this counts. */
+const [crossingWork, fewCorners] = [10, 100];
 /** A material that no file has: the reader gives the usual one. */
 const noMaterial = " ";
 /** A semantic of which the reader knows nothing. */
@@ -96,12 +98,16 @@ function cornersOf({ xml, called, places }: DaeMesh, faces: Faces, most: { trian
       for (let k = begin; k < begin + count; ++k) for (let n = 0; n < 3; ++n) points.push(places[3 * vertexOf(k) + n]!);
       const found = triangulated(points, holes.get(item) ?? [count]);
       if (!found) throw fault("with a hole that does not lie within its outline, or crosses it or another hole");
+      if (count > fewCorners && isFan(found)) most.work -= (crossingWork - 1) * count ** 2;
       for (const corner of found) corners.push(begin + corner);
     }
     begin += count;
   });
   return corners;
 }
+
+/** So a polygon is parted that crosses itself. */
+const isFan = (triangles: readonly number[]) => triangles.every((corner, k) => k % 3 > 0 || corner === 0);
 
 /** Without the triangles of two corners that join strips. */
 function addStrip(
