@@ -114,6 +114,20 @@ describe("a DOCTYPE", () => {
     );
   });
 
+  it("in another place or in small letters is refused by its line", async () => {
+    const second = but(doctype(""), "<COLLADA", '<!-- a -->\n<!DOCTYPE COLLADA [<!ENTITY a "1">]>\n<COLLADA');
+    expect(await refusalOf(second)).toBe("a.dae, line 4: this is a second DOCTYPE, and a file has one at most.");
+    const late = "a DOCTYPE can stand before the first element only.";
+    expect(await refusalOf(but(dae, "<asset>", "<!DOCTYPE a><asset>"))).toBe(`a.dae, line 3: ${late}`);
+    expect(await refusalOf(but(doctype(""), "<asset>", '<!DOCTYPE a [<!ENTITY a "1">]><asset>'))).toBe(`a.dae, line 4: ${late}`);
+    expect(await refusalOf(`${dae}\n<!DOCTYPE a>`)).toBe(`a.dae, line ${linesOf(dae) + 1}: ${late}`);
+    expect(await refusalOf(but(doctype(""), "<!DOCTYPE", "<!doctype"))).toBe(
+      "a.dae, line 2: <!doctype must be in capitals: <!DOCTYPE.",
+    );
+    expect(await refusalOf(but(dae, "<asset>", "<!ELEMENT a ANY><asset>"))).toBe("a.dae, line 3: <!ELEMENT cannot stand here.");
+    expect(await glbOf(but(dae, "<asset>", "<!-- <!DOCTYPE a> --><asset>"))).toEqual(wanted);
+  });
+
   it("without an end is refused by its line, however long it is", async () => {
     expect(await refusalOf(but(dae, "?>\n", "?>\n<!DOCTYPE a [ "))).toContain(
       "a.dae ends too soon: the DOCTYPE of line 2 has no end.",
@@ -123,4 +137,13 @@ describe("a DOCTYPE", () => {
       "a.dae ends too soon: the DOCTYPE of line 1 has no end.",
     );
   });
+});
+
+it("nodes may lie in each other up to a limit, and are refused by their line beyond", async () => {
+  const nested = (count: number) => but(but(dae, "<node ", `${"<node>\n".repeat(count)}<node `), "</node>", "</node>".repeat(count + 1));
+  expect((await glbOf(nested(990))).length).toBeGreaterThan(wanted.length);
+  const line = dae.split("\n").findIndex((one) => one.includes("<node ")) + 1 + 997; // three elements lie above
+  expect(await refusalOf(nested(5000))).toBe(
+    `a.dae, line ${line}: <node> lies in 1000 other elements; this page reads no deeper.`,
+  );
 });

@@ -16,8 +16,12 @@ const blank = (text: string) => text.replace(/[^\r\n]/g, " ");
 function withoutDoctype(name: string, text: string): string {
   const begin = doctypeIn(text);
   if (begin < 0) return text;
-  const end = doctypeEnd(new XmlText(name, text), begin);
-  return text.slice(0, begin) + blank(text.slice(begin, end)) + text.slice(end);
+  const xml = new XmlText(name, text);
+  const end = doctypeEnd(xml, begin);
+  const plain = text.slice(0, begin) + blank(text.slice(begin, end)) + text.slice(end);
+  const second = doctypeIn(plain);
+  if (second >= 0) throw xml.fault(second, "this is a second DOCTYPE, and a file has one at most");
+  return plain;
 }
 
 /** Where it begins, before the first element; −1 if there is none. */
