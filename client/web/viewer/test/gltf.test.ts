@@ -3,6 +3,7 @@ import { FileFault } from "lpdeform-client/mesh/fault";
 import { newGlb } from "../src/io/write_glb.js";
 import { type GltfDocument, type Part, readGltfDocument, writeGlb } from "lpdeform-client/mesh/gltf_document";
 import { rewriteGlb } from "../src/io/gltf_rewrite.js";
+import { readBlocks } from "lpdeform-client/mesh/gltf_blocks";
 import { parseMesh } from "lpdeform-client/mesh/read";
 import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { seamsOf } from "lpdeform-client/mesh/seams";
@@ -185,6 +186,23 @@ describe("a GLB file", () => {
     expect(meshOf(glb).notices).toBeUndefined();
     const { json } = documentOf(rewriteGlb(mesh, turned(mesh))) as { json: any };
     expect(json.meshes[0].primitives.map(({ mode }: any) => mode)).toEqual([undefined, 0, 1, undefined]);
+  });
+
+  it("may have a node of very many children, and a mesh of very many primitives", () => {
+    const count = 200_000;
+    const children = with_((json) => {
+      const first = json.nodes.length;
+      for (let k = 0; k < count; ++k) json.nodes.push({});
+      json.nodes[0].children = [...(json.nodes[0].children ?? []), ...Array.from({ length: count }, (_, k) => first + k)];
+    }, makeGlb(true));
+    expect(meshOf(children).faces).toEqual(meshOf(makeGlb(true)).faces);
+    const primitives = with_((json) => {
+      const own = { ...json.accessors[json.meshes[0].primitives[0].attributes.POSITION], count: 3 };
+      const first = json.accessors.length;
+      for (let k = 0; k < count; ++k) json.accessors.push(own);
+      json.meshes[0].primitives = Array.from({ length: count }, (_, k) => ({ attributes: { POSITION: first + k } }));
+    }, makeGlb(true));
+    expect(readBlocks(documentOf(primitives)).blocks.length).toBe(count);
   });
 
   it("says which corners make no triangle", () => {

@@ -105,11 +105,7 @@ function nodesOf(json: Part): Map<number, Placement> {
     if (found.has(node)) refuse(name, "is reached twice: nodes must be trees");
     const toWorld = product(above, ownTransform(nodes[node]!, name));
     found.set(node, toWorld);
-    open.push(
-      ...childrenOf(nodes[node]!, "children", name)
-        .map((child) => [child, toWorld] as const)
-        .reverse(),
-    );
+    for (const child of childrenOf(nodes[node]!, "children", name).reverse()) open.push([child, toWorld]);
   }
   return found;
 }
@@ -172,7 +168,7 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Plac
     return;
   }
   const primitives = listOf(listOf(json, "meshes")[mesh]!, "primitives");
-  const own: Block[] = [];
+  const own = new Map<string, Block>(); // by its accessors
   primitives.forEach((primitive, k) => {
     const part = `primitive ${k} of ${nameOf(json, "meshes", mesh)}`;
     if (partOf(primitive["extensions"])["KHR_draco_mesh_compression"]) {
@@ -193,9 +189,8 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Plac
       list.notices.add(`There are no positions in ${part}: it stays as it is.`);
       return;
     }
-    let block = own.find(
-      (other) => other.position === position && other.normal === normal && other.tangent === tangent,
-    );
+    const key = [position, normal, tangent].join();
+    let block = own.get(key);
     if (block) block.primitives.push(k);
     else {
       const count = countOf(document, position);
@@ -204,7 +199,7 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Plac
       if (tangent !== undefined && countOf(document, tangent) !== count)
         refuse(part, "has attributes of different lengths");
       block = { node, mesh, primitives: [k], position, normal, tangent, placement, first: list.vertexCount, count };
-      own.push(block);
+      own.set(key, block);
       list.vertexCount += count;
       if (list.vertexCount > most) refuse("the scene", `has more than ${most} vertices, which this page takes at most`);
     }
@@ -216,7 +211,7 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Plac
     if (rest > 0) list.notices.add(`Corners at the end of ${part} make no triangle: ${rest} of ${length}.`);
     list.parts.push({ block, primitive: k, firstFace, faceCount: list.faces.length / 3 - firstFace });
   });
-  list.blocks.push(...own);
+  for (const block of own.values()) list.blocks.push(block);
 }
 
 function cornersOf(document: GltfDocument, primitive: Part, count: number, part: string): ArrayLike<number> {
