@@ -281,6 +281,13 @@ describe("corners keep their normals, texture coordinates and colours, and faces
     expect(["blue", "red"]).not.toContain(all[0]!.material);
   });
 
+  it.each([" ", "none-0"])("also where the file calls a material “%s”", async (name) => {
+    const bare = other("polygons", "", 0, 1, 2).replace(' material=""', "");
+    const text = rich(bare + other("polygons", name, 0, 1, 2)).replace('symbol="blue"', `symbol="${name}"`);
+    expect((await primitivesOf(text)).all[1]!.material).toBe("blue");
+    expect((await primitivesOf(text)).all[0]!.material).not.toBe("blue");
+  });
+
   it("also beside elements without faces, which have none", async () => {
     const full = other("polygons", "red", 0, 1, 2, 3);
     const empty = ["triangles", "polygons"].map((name) => element(name, 0, name === "triangles" ? "<p/>" : "")).join("");

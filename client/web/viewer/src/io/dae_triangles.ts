@@ -2,6 +2,7 @@ import { FileFault } from "lpdeform-client/mesh/fault";
 import type { DaeMesh } from "./dae_faults.js";
 import { type FaceInput, type Faces, isVertex } from "./dae_polygons.js";
 import { triangulated } from "./triangulate.js";
+import type { XmlText } from "./xml.js";
 
 // The reader of three.js knows neither strips, fans nor holes, reads one of several <polygons>, and mixes up materials and attributes
 // that only some elements of a mesh have. So they all become <triangles>. Corners keep their normals, texture coordinates and colours.
@@ -12,8 +13,6 @@ const mostTriangles = 5_000_000;
 const [mostCorners, mostWork] = [10_000, 5e8];
 /** A polygon that crosses itself takes about so many times as long as another one. From `fewCorners` on this counts. */
 const [crossingWork, fewCorners] = [10, 100];
-/** A material that no file has: the reader gives the usual one. */
-const noMaterial = " ";
 /** A semantic of which the reader knows nothing. */
 const unread = "NONE";
 
@@ -22,6 +21,7 @@ export function withTriangles(name: string, text: string, meshes: readonly DaeMe
   const left = new Set<string>();
   const pieces: string[] = [];
   const most = { triangles: mostTriangles, work: mostWork };
+  let noMaterial: string | undefined;
   let end = 0;
   for (const mesh of meshes) {
     const filled = mesh.faces.filter(({ indices }) => indices.length > 0);
@@ -31,6 +31,7 @@ export function withTriangles(name: string, text: string, meshes: readonly DaeMe
     const isAlike = materials.every(Boolean) || !materials.some(Boolean);
     const hasEmpty = filled.length < mesh.faces.length;
     if (isPlain && isAlike && !isLost && !hasEmpty) continue;
+    if (!isAlike) noMaterial ??= unusedMaterial(mesh.xml);
     for (const faces of mesh.faces) {
       if (faces.element.at < end) continue; // it stands in other faces, where the reader does not look
       const corners = cornersOf(mesh, faces, most);
@@ -44,6 +45,15 @@ export function withTriangles(name: string, text: string, meshes: readonly DaeMe
   }
   pieces.push(text.slice(end));
   return { text: pieces.join(""), left };
+}
+
+/** A material that the file does not have: the reader gives the usual one. */
+function unusedMaterial(xml: XmlText): string {
+  const used = new Set<string | undefined>();
+  for (const { attributes } of xml.tags()) used.add(attributes["symbol"]).add(attributes["material"]);
+  let number = 0;
+  while (used.has(`none-${number}`)) ++number;
+  return `none-${number}`;
 }
 
 /** An attribute as the reader tells it from others. */
