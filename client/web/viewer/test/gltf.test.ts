@@ -123,13 +123,25 @@ describe("a GLB file", () => {
       (json) => (json.meshes[0].primitives[0].extensions = { KHR_draco_mesh_compression: {} }),
     ],
     ["BufferView 1 is compressed by EXT_meshopt", (json) => (json.bufferViews[1].extensions = { EXT_meshopt_compression: {} })],
-    ["The extension ACME_secret is required", (json) => (json.extensionsRequired = ["ACME_secret"])],
+    ["The extension “ACME_secret” is required", (json) => (json.extensionsRequired = ["ACME_secret"])],
     [
-      "The extension KHR_draco_mesh_compression is required",
+      "The extension “KHR_draco_mesh_compression” is required",
       (json) => (json.extensionsRequired = ["KHR_texture_basisu", "KHR_draco_mesh_compression"]),
     ],
-    ["The extension EXT_meshopt_compression is required", (json) => (json.extensionsRequired = ["EXT_meshopt_compression"])],
-    ["The extension ACME_draco is required", (json) => (json.extensionsRequired = ["ACME_draco"])],
+    ["The extension “EXT_meshopt_compression” is required", (json) => (json.extensionsRequired = ["EXT_meshopt_compression"])],
+    ["The extension “” is required", (json) => (json.extensionsRequired = [""])],
+    [`The extension “${"x".repeat(60)}...” is required`, (json) => (json.extensionsRequired = ["x".repeat(5000)])],
+    [
+      `BufferView 1 (“${"x".repeat(59)}...”) is`,
+      (json) => {
+        json.bufferViews[1] = {
+          ...json.bufferViews[1],
+          name: `${"x".repeat(59)}😀`,
+          extensions: { EXT_meshopt_compression: {} },
+        };
+      },
+    ],
+    ["The extension “ACME_draco” is required", (json) => (json.extensionsRequired = ["ACME_draco"])],
     [
       "Primitive 0 of mesh 0 (“sheet”) is compressed by KHR_draco",
       (json) => {

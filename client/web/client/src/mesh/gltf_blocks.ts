@@ -1,6 +1,16 @@
 import { mat4, quat, type vec3 } from "gl-matrix";
 import { countOf, readNumbers } from "./gltf_accessors.js";
-import { type GltfDocument, indexOf, listOf, nameOf, type Part, partOf, refuse, wholeOf } from "./gltf_document.js";
+import {
+  type GltfDocument,
+  indexOf,
+  listOf,
+  nameOf,
+  type Part,
+  partOf,
+  quoted,
+  refuse,
+  wholeOf,
+} from "./gltf_document.js";
 
 /** Sixteen doubles, column by column. */
 export type Placement = number[];
@@ -52,7 +62,8 @@ export function readBlocks(document: GltfDocument): DrawList {
   const required = requiredOf(json);
   checkExtensions(required.filter((name) => !isCompression(name)));
   listOf(json, "bufferViews").forEach((view, k) => {
-    const name = Object.keys(partOf(view["extensions"])).find((key) => key.endsWith("_meshopt_compression"));
+    const extensions = partOf(view["extensions"]);
+    const name = ["EXT_meshopt_compression", "KHR_meshopt_compression"].find((key) => key in extensions);
     if (name) refuse(nameOf(json, "bufferViews", k), `is compressed by ${name}, which is not read`);
   });
   const list: DrawList = { blocks: [], vertexCount: 0, faces: [], parts: [], left: new Set(), notices: new Set() };
@@ -81,7 +92,7 @@ const harmless = /_materials_|_texture_|_lights_|_animation_|_audio|_xmp|KHR_mes
 
 function checkExtensions(required: readonly string[]): void {
   const unknown = required.find((name) => !harmless.test(name));
-  if (unknown !== undefined) refuse(`the extension ${unknown}`, "is required by the file and not known here");
+  if (unknown !== undefined) refuse(`the extension ${quoted(unknown)}`, "is required by the file and not known here");
 }
 
 /** The nodes of the scene, each before its children, with their transforms. */
