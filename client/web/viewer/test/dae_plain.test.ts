@@ -119,7 +119,9 @@ describe("a DOCTYPE", () => {
     expect(await refusalOf(second)).toBe("a.dae, line 4: this is a second DOCTYPE, and a file has one at most.");
     const late = "a DOCTYPE can stand before the first element only.";
     expect(await refusalOf(but(dae, "<asset>", "<!DOCTYPE a><asset>"))).toBe(`a.dae, line 3: ${late}`);
-    expect(await refusalOf(but(doctype(""), "<asset>", '<!DOCTYPE a [<!ENTITY a "1">]><asset>'))).toBe(`a.dae, line 4: ${late}`);
+    expect(await refusalOf(but(doctype(""), "<asset>", '<!DOCTYPE a [<!ENTITY a "1">]><asset>'))).toBe(
+      `a.dae, line 4: ${late}`,
+    );
     expect(await refusalOf(`${dae}\n<!DOCTYPE a>`)).toBe(`a.dae, line ${linesOf(dae) + 1}: ${late}`);
     expect(await refusalOf(but(doctype(""), "<!DOCTYPE", "<!doctype"))).toBe(
       "a.dae, line 2: <!doctype must be in capitals: <!DOCTYPE.",
@@ -140,7 +142,8 @@ describe("a DOCTYPE", () => {
 });
 
 it("nodes may lie in each other up to a limit, and are refused by their line beyond", async () => {
-  const nested = (count: number) => but(but(dae, "<node ", `${"<node>\n".repeat(count)}<node `), "</node>", "</node>".repeat(count + 1));
+  const nested = (count: number) =>
+    but(but(dae, "<node ", `${"<node>\n".repeat(count)}<node `), "</node>", "</node>".repeat(count + 1));
   expect((await glbOf(nested(990))).length).toBeGreaterThan(wanted.length);
   const line = dae.split("\n").findIndex((one) => one.includes("<node ")) + 1 + 997; // three elements lie above
   expect(await refusalOf(nested(5000))).toBe(

@@ -16,8 +16,12 @@ const [crossingWork, fewCorners] = [10, 100];
 /** A semantic of which the reader knows nothing. */
 const unread = "NONE";
 
-/** The file with triangles, and what some faces had that is left out, in words. Throws a FileFault. */
-export function withTriangles(name: string, text: string, meshes: readonly DaeMesh[]): { text: string; left: Set<string> } {
+/** The file with triangles, and in words what some faces had that is left out, if anything. Throws a FileFault. */
+export function withTriangles(
+  name: string,
+  text: string,
+  meshes: readonly DaeMesh[],
+): { text: string; left: string | undefined } {
   const left = new Set<string>();
   const pieces: string[] = [];
   const most = { triangles: mostTriangles, work: mostWork };
@@ -44,7 +48,8 @@ export function withTriangles(name: string, text: string, meshes: readonly DaeMe
     }
   }
   pieces.push(text.slice(end));
-  return { text: pieces.join(""), left };
+  const words = [...left].join(", ").replace(/, (?=[^,]*$)/, " and ");
+  return { text: pieces.join(""), left: left.size > 0 ? `${words} that only some of its faces have` : undefined };
 }
 
 /** A material that the file does not have: the reader gives the usual one. */
@@ -82,7 +87,7 @@ function keptKeys(all: readonly Faces[], left: Set<string>): { kept: Set<string>
     if (found.every(({ source }) => source.stride === stride) && (isFilled || found.length === all.length)) kept.add(key);
     else {
       isLost = true;
-      left.add(`${attributes[key]} that only some faces have`);
+      left.add(attributes[key]!);
     }
   }
   return { kept, isLost };
