@@ -43,7 +43,7 @@ void check_extensions(const Json& root, bool of_compression) {
     if (!name.is_string()) refuse("\"extensionsRequired\"", "has an item that is no text");
     const auto& text = name.get_ref<const std::string&>();
     if (is_compression(text) == of_compression && !is_harmless(text))
-      refuse_unsupported(absl::StrCat("the extension ", printable(text)),
+      refuse_unsupported(absl::StrCat("the extension \"", printable(text), "\""),
                          "is required by the file and not known here");
   }
 }

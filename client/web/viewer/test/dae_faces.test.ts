@@ -157,14 +157,32 @@ it.each<[string, string]>([
     `, line 18: ${own} 0 with 4 indices, which is no multiple of the 3 of a`,
   ],
   [plate(outline).replace('offset="0"', 'offset="99999999999999999999"'), " with 4 indices, which is no multiple of the 1"],
-  [plate(`<p>${"0 1 2 3 ".repeat(5001)}</p>`), `, line 18: ${own} 0 with 20004 corners; this page reads 20000 at most.`],
+  [plate(`<p>${"0 1 2 3 ".repeat(2501)}</p>`), `, line 18: ${own} 0 with 10004 corners; this page reads 10000 at most.`],
   [
-    plate(`<p>${"0 1 ".repeat(10_000)}</p>\n`.repeat(2), 2),
+    plate(`<p>${"0 1 ".repeat(5000)}</p>\n`.repeat(2), 2),
     `, line 19: ${own} 1 after so many large ones that reading them takes too long.`,
   ],
 ])("wrong polygons are refused by their line (%#)", async (content, words) => {
   expect(await refusalOf(content)).toContain(`a.dae${words}`.slice(words.startsWith(",") ? 0 : 5));
 });
+
+it("polygons of many corners are refused early if they cross themselves", async () => {
+  const round = Array.from({ length: 3000 }, (_, k) => [
+    Math.cos((2 * Math.PI * k) / 3000),
+    Math.sin((2 * Math.PI * k) / 3000),
+    0,
+  ]);
+  const places = round.flat();
+  const text = dae.replace(/(<float_array[^>]*count=")\d+(">)[^<]*/, `$1${places.length}$2${places.join(" ")}`);
+  const polygons = (step: number, count: number) => {
+    const list = `<p>${round.map((_, k) => (k * step) % 3000).join(" ")}</p>\n`;
+    return faces(element("polygons", count, list.repeat(count)), text);
+  };
+  expect((await meshOf(polygons(1, 20))).faces.length / 3).toBe(20 * 2998);
+  expect(await refusalOf(polygons(1409, 20))).toMatch(
+    /has a polygon 6 after so many large ones that reading them takes too long\.$/,
+  );
+}, 60_000);
 
 it.each<[string, string]>([
   ["tristrips", "strip"],
@@ -269,12 +287,26 @@ describe("corners keep their normals, texture coordinates and colours, and faces
     expect(["blue", "red"]).not.toContain(all[0]!.material);
   });
 
+  it.each([" ", "none-0"])("also where the file calls a material “%s”", async (name) => {
+    const bare = other("polygons", "", 0, 1, 2).replace(' material=""', "");
+    const text = rich(bare + other("polygons", name, 0, 1, 2)).replace('symbol="blue"', `symbol="${name}"`);
+    expect((await primitivesOf(text)).all[1]!.material).toBe("blue");
+    expect((await primitivesOf(text)).all[0]!.material).not.toBe("blue");
+  });
+
+  it("also beside elements without faces, which have none", async () => {
+    const full = other("polygons", "red", 0, 1, 2, 3);
+    const empty = ["triangles", "polygons"].map((name) => element(name, 0, name === "triangles" ? "<p/>" : "")).join("");
+    expect(await primitivesOf(rich(empty + full))).toEqual(await primitivesOf(rich(full)));
+    expect(await primitivesOf(rich(full + empty))).toEqual(await primitivesOf(rich(full)));
+    const plain = triangles("red", 0, 1, 2);
+    expect(await primitivesOf(rich(plain + element("triangles", 0, "<p/>")))).toEqual(await primitivesOf(rich(plain)));
+  });
+
   it("unless only some faces have them, and then the page says so", async () => {
     const plain = `<trifans count="1">${vertexInput}<p>0 1 13</p></trifans>`;
     const made = await primitivesOf(rich(other("polygons", "red", 0, 1, 2, 3) + plain));
-    expect(made.left).toEqual(
-      expect.arrayContaining(["normals that only some faces have", "colours that only some faces have"]),
-    );
+    expect(made.left).toEqual(["normals and colours that only some of its faces have", "textures"]);
     const keys = made.all.flatMap(({ of }) => Object.keys(of));
     expect(keys).not.toContain("NORMAL");
     expect(keys).not.toContain("COLOR_0");

@@ -51,12 +51,22 @@ describe("elements with a prefix", () => {
     expect(await glbOf(empty)).toEqual(wanted);
   });
 
-  it("that is bound to something else, or to nothing, are left out with all that is in them", async () => {
+  it("that is bound to something else are left out with all that is in them", async () => {
     const other = `<x:triangles xmlns:x="urn:x" count="many"><x:p>a</x:p>\n<triangles count="7"/></x:triangles>`;
     expect(await glbOf(but(dae, "<triangles", `${other}<triangles`))).toEqual(wanted);
-    expect(await glbOf(but(dae, "<triangles", "<y:extra/><triangles"))).toEqual(wanted);
+    expect(await glbOf(but(dae, "<triangles", '<xml:extra/><x:extra xmlns:x="urn:x"/><triangles'))).toEqual(wanted);
     const again = `<c:extra xmlns:c="urn:x"><c:a/></c:extra>`; // within, the prefix is another's
     expect(await glbOf(but(prefixed(dae, "c"), "<c:triangles", `${again}<c:triangles`))).toEqual(wanted);
+  });
+
+  it("that nothing declares are refused by their line", async () => {
+    const undeclared = "a.dae, line 17: <y:triangles> has the prefix “y”, which nothing declares.";
+    const own = but(dae, "<triangles", "<y:triangles").replace("</triangles>", "</y:triangles>");
+    expect(await refusalOf(own)).toBe(undeclared);
+    expect(await refusalOf(but(own, "<COLLADA ", '<COLLADA xmlns:y="" '))).toBe(undeclared);
+    expect(await refusalOf(but(own, "<asset>", `<y:extra xmlns:y="${address}"/><asset>`))).toBe(undeclared);
+    const inner = but(dae, "<triangles", '<x:a xmlns:x="urn:x"><y:b/></x:a><triangles');
+    expect(await refusalOf(inner)).toBe("a.dae, line 17: <y:b> has the prefix “y”, which nothing declares.");
   });
 
   it("are refused by their line as others are, and by the prefix if the file begins with another's", async () => {
@@ -104,6 +114,22 @@ describe("a DOCTYPE", () => {
     );
   });
 
+  it("in another place or in small letters is refused by its line", async () => {
+    const second = but(doctype(""), "<COLLADA", '<!-- a -->\n<!DOCTYPE COLLADA [<!ENTITY a "1">]>\n<COLLADA');
+    expect(await refusalOf(second)).toBe("a.dae, line 4: this is a second DOCTYPE, and a file has one at most.");
+    const late = "a DOCTYPE can stand before the first element only.";
+    expect(await refusalOf(but(dae, "<asset>", "<!DOCTYPE a><asset>"))).toBe(`a.dae, line 3: ${late}`);
+    expect(await refusalOf(but(doctype(""), "<asset>", '<!DOCTYPE a [<!ENTITY a "1">]><asset>'))).toBe(
+      `a.dae, line 4: ${late}`,
+    );
+    expect(await refusalOf(`${dae}\n<!DOCTYPE a>`)).toBe(`a.dae, line ${linesOf(dae) + 1}: ${late}`);
+    expect(await refusalOf(but(doctype(""), "<!DOCTYPE", "<!doctype"))).toBe(
+      "a.dae, line 2: <!doctype must be in capitals: <!DOCTYPE.",
+    );
+    expect(await refusalOf(but(dae, "<asset>", "<!ELEMENT a ANY><asset>"))).toBe("a.dae, line 3: <!ELEMENT cannot stand here.");
+    expect(await glbOf(but(dae, "<asset>", "<!-- <!DOCTYPE a> --><asset>"))).toEqual(wanted);
+  });
+
   it("without an end is refused by its line, however long it is", async () => {
     expect(await refusalOf(but(dae, "?>\n", "?>\n<!DOCTYPE a [ "))).toContain(
       "a.dae ends too soon: the DOCTYPE of line 2 has no end.",
@@ -113,4 +139,14 @@ describe("a DOCTYPE", () => {
       "a.dae ends too soon: the DOCTYPE of line 1 has no end.",
     );
   });
+});
+
+it("nodes may lie in each other up to a limit, and are refused by their line beyond", async () => {
+  const nested = (count: number) =>
+    but(but(dae, "<node ", `${"<node>\n".repeat(count)}<node `), "</node>", "</node>".repeat(count + 1));
+  expect((await glbOf(nested(490))).length).toBeGreaterThan(wanted.length);
+  const line = dae.split("\n").findIndex((one) => one.includes("<node ")) + 1 + 497; // three elements lie above
+  expect(await refusalOf(nested(5000))).toBe(
+    `a.dae, line ${line}: <node> lies in 500 other elements; this page reads no deeper.`,
+  );
 });

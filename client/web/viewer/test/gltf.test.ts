@@ -3,6 +3,7 @@ import { FileFault } from "lpdeform-client/mesh/fault";
 import { newGlb } from "../src/io/write_glb.js";
 import { type GltfDocument, type Part, readGltfDocument, writeGlb } from "lpdeform-client/mesh/gltf_document";
 import { rewriteGlb } from "../src/io/gltf_rewrite.js";
+import { readBlocks } from "lpdeform-client/mesh/gltf_blocks";
 import { parseMesh } from "lpdeform-client/mesh/read";
 import type { Mesh } from "lpdeform-client/mesh/mesh";
 import { seamsOf } from "lpdeform-client/mesh/seams";
@@ -122,13 +123,25 @@ describe("a GLB file", () => {
       (json) => (json.meshes[0].primitives[0].extensions = { KHR_draco_mesh_compression: {} }),
     ],
     ["BufferView 1 is compressed by EXT_meshopt", (json) => (json.bufferViews[1].extensions = { EXT_meshopt_compression: {} })],
-    ["The extension ACME_secret is required", (json) => (json.extensionsRequired = ["ACME_secret"])],
+    ["The extension “ACME_secret” is required", (json) => (json.extensionsRequired = ["ACME_secret"])],
     [
-      "The extension KHR_draco_mesh_compression is required",
+      "The extension “KHR_draco_mesh_compression” is required",
       (json) => (json.extensionsRequired = ["KHR_texture_basisu", "KHR_draco_mesh_compression"]),
     ],
-    ["The extension EXT_meshopt_compression is required", (json) => (json.extensionsRequired = ["EXT_meshopt_compression"])],
-    ["The extension ACME_draco is required", (json) => (json.extensionsRequired = ["ACME_draco"])],
+    ["The extension “EXT_meshopt_compression” is required", (json) => (json.extensionsRequired = ["EXT_meshopt_compression"])],
+    ["The extension “” is required", (json) => (json.extensionsRequired = [""])],
+    [`The extension “${"x".repeat(60)}...” is required`, (json) => (json.extensionsRequired = ["x".repeat(5000)])],
+    [
+      `BufferView 1 (“${"x".repeat(59)}...”) is`,
+      (json) => {
+        json.bufferViews[1] = {
+          ...json.bufferViews[1],
+          name: `${"x".repeat(59)}😀`,
+          extensions: { EXT_meshopt_compression: {} },
+        };
+      },
+    ],
+    ["The extension “ACME_draco” is required", (json) => (json.extensionsRequired = ["ACME_draco"])],
     [
       "Primitive 0 of mesh 0 (“sheet”) is compressed by KHR_draco",
       (json) => {
@@ -185,6 +198,23 @@ describe("a GLB file", () => {
     expect(meshOf(glb).notices).toBeUndefined();
     const { json } = documentOf(rewriteGlb(mesh, turned(mesh))) as { json: any };
     expect(json.meshes[0].primitives.map(({ mode }: any) => mode)).toEqual([undefined, 0, 1, undefined]);
+  });
+
+  it("may have a node of very many children, and a mesh of very many primitives", () => {
+    const count = 200_000;
+    const children = with_((json) => {
+      const first = json.nodes.length;
+      for (let k = 0; k < count; ++k) json.nodes.push({});
+      json.nodes[0].children = [...(json.nodes[0].children ?? []), ...Array.from({ length: count }, (_, k) => first + k)];
+    }, makeGlb(true));
+    expect(meshOf(children).faces).toEqual(meshOf(makeGlb(true)).faces);
+    const primitives = with_((json) => {
+      const own = { ...json.accessors[json.meshes[0].primitives[0].attributes.POSITION], count: 3 };
+      const first = json.accessors.length;
+      for (let k = 0; k < count; ++k) json.accessors.push(own);
+      json.meshes[0].primitives = Array.from({ length: count }, (_, k) => ({ attributes: { POSITION: first + k } }));
+    }, makeGlb(true));
+    expect(readBlocks(documentOf(primitives)).blocks.length).toBe(count);
   });
 
   it("says which corners make no triangle", () => {

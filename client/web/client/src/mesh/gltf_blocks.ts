@@ -1,6 +1,16 @@
 import { mat4, quat, type vec3 } from "gl-matrix";
 import { countOf, readNumbers } from "./gltf_accessors.js";
-import { type GltfDocument, indexOf, listOf, nameOf, type Part, partOf, refuse, wholeOf } from "./gltf_document.js";
+import {
+  type GltfDocument,
+  indexOf,
+  listOf,
+  nameOf,
+  type Part,
+  partOf,
+  quoted,
+  refuse,
+  wholeOf,
+} from "./gltf_document.js";
 
 /** Sixteen doubles, column by column. */
 export type Placement = number[];
@@ -52,7 +62,8 @@ export function readBlocks(document: GltfDocument): DrawList {
   const required = requiredOf(json);
   checkExtensions(required.filter((name) => !isCompression(name)));
   listOf(json, "bufferViews").forEach((view, k) => {
-    const name = Object.keys(partOf(view["extensions"])).find((key) => key.endsWith("_meshopt_compression"));
+    const extensions = partOf(view["extensions"]);
+    const name = ["EXT_meshopt_compression", "KHR_meshopt_compression"].find((key) => key in extensions);
     if (name) refuse(nameOf(json, "bufferViews", k), `is compressed by ${name}, which is not read`);
   });
   const list: DrawList = { blocks: [], vertexCount: 0, faces: [], parts: [], left: new Set(), notices: new Set() };
@@ -81,7 +92,7 @@ const harmless = /_materials_|_texture_|_lights_|_animation_|_audio|_xmp|KHR_mes
 
 function checkExtensions(required: readonly string[]): void {
   const unknown = required.find((name) => !harmless.test(name));
-  if (unknown !== undefined) refuse(`the extension ${unknown}`, "is required by the file and not known here");
+  if (unknown !== undefined) refuse(`the extension ${quoted(unknown)}`, "is required by the file and not known here");
 }
 
 /** The nodes of the scene, each before its children, with their transforms. */
@@ -105,11 +116,7 @@ function nodesOf(json: Part): Map<number, Placement> {
     if (found.has(node)) refuse(name, "is reached twice: nodes must be trees");
     const toWorld = product(above, ownTransform(nodes[node]!, name));
     found.set(node, toWorld);
-    open.push(
-      ...childrenOf(nodes[node]!, "children", name)
-        .map((child) => [child, toWorld] as const)
-        .reverse(),
-    );
+    for (const child of childrenOf(nodes[node]!, "children", name).reverse()) open.push([child, toWorld]);
   }
   return found;
 }
@@ -172,7 +179,7 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Plac
     return;
   }
   const primitives = listOf(listOf(json, "meshes")[mesh]!, "primitives");
-  const own: Block[] = [];
+  const own = new Map<string, Block>(); // by its accessors
   primitives.forEach((primitive, k) => {
     const part = `primitive ${k} of ${nameOf(json, "meshes", mesh)}`;
     if (partOf(primitive["extensions"])["KHR_draco_mesh_compression"]) {
@@ -193,9 +200,8 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Plac
       list.notices.add(`There are no positions in ${part}: it stays as it is.`);
       return;
     }
-    let block = own.find(
-      (other) => other.position === position && other.normal === normal && other.tangent === tangent,
-    );
+    const key = [position, normal, tangent].join();
+    let block = own.get(key);
     if (block) block.primitives.push(k);
     else {
       const count = countOf(document, position);
@@ -204,7 +210,7 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Plac
       if (tangent !== undefined && countOf(document, tangent) !== count)
         refuse(part, "has attributes of different lengths");
       block = { node, mesh, primitives: [k], position, normal, tangent, placement, first: list.vertexCount, count };
-      own.push(block);
+      own.set(key, block);
       list.vertexCount += count;
       if (list.vertexCount > most) refuse("the scene", `has more than ${most} vertices, which this page takes at most`);
     }
@@ -216,7 +222,7 @@ function readNode(document: GltfDocument, node: number, worlds: Map<number, Plac
     if (rest > 0) list.notices.add(`Corners at the end of ${part} make no triangle: ${rest} of ${length}.`);
     list.parts.push({ block, primitive: k, firstFace, faceCount: list.faces.length / 3 - firstFace });
   });
-  list.blocks.push(...own);
+  for (const block of own.values()) list.blocks.push(block);
 }
 
 function cornersOf(document: GltfDocument, primitive: Part, count: number, part: string): ArrayLike<number> {

@@ -194,11 +194,19 @@ export function listOf(json: Part, list: string): Part[] {
   return items as Part[];
 }
 
+const longestName = 60;
+
+/** A name that a file gives, in quotes. It is cut where it is long. */
+export function quoted(name: string): string {
+  const isLong = name.length > longestName;
+  return `“${isLong ? `${name.slice(0, longestName).replace(/[\ud800-\udbff]$/, "")}...` : name}”`;
+}
+
 /** “mesh 3 (“body”)”. */
 export function nameOf(json: Part, list: string, index: number): string {
   const name = partOf((json[list] as unknown[] | undefined)?.[index])["name"];
   const kind = list === "meshes" ? "mesh" : list.slice(0, -1);
-  return typeof name === "string" && name !== "" ? `${kind} ${index} (“${name.slice(0, 60)}”)` : `${kind} ${index}`;
+  return typeof name === "string" && name !== "" ? `${kind} ${index} (${quoted(name)})` : `${kind} ${index}`;
 }
 
 export function indexOf(json: Part, value: unknown, list: string, part: string): number {

@@ -5,7 +5,7 @@ import { type Tag, XmlText } from "./xml.js";
 
 /**
  * The file without its DOCTYPE, without the prefixes that are bound to COLLADA, and without elements whose prefix is bound to something
- * else. Throws a FileFault.
+ * else. Throws a FileFault, also where nothing declares a prefix.
  */
 export function plainDae(name: string, text: string): string {
   return withoutPrefixes(name, withoutDoctype(name, text));
@@ -16,8 +16,12 @@ const blank = (text: string) => text.replace(/[^\r\n]/g, " ");
 function withoutDoctype(name: string, text: string): string {
   const begin = doctypeIn(text);
   if (begin < 0) return text;
-  const end = doctypeEnd(new XmlText(name, text), begin);
-  return text.slice(0, begin) + blank(text.slice(begin, end)) + text.slice(end);
+  const xml = new XmlText(name, text);
+  const end = doctypeEnd(xml, begin);
+  const plain = text.slice(0, begin) + blank(text.slice(begin, end)) + text.slice(end);
+  const second = doctypeIn(plain);
+  if (second >= 0) throw xml.fault(second, "this is a second DOCTYPE, and a file has one at most");
+  return plain;
 }
 
 /** Where it begins, before the first element; −1 if there is none. */
@@ -58,7 +62,7 @@ const collada = /^https?:\/\/www\.collada\.org\//;
 
 /** What prefixes are bound to, at the place that is read. */
 class Prefixes {
-  readonly #bound = new Map<string, string[]>();
+  readonly #bound = new Map<string, string[]>([["xml", ["http://www.w3.org/XML/1998/namespace"]]]);
   /** Of each element that is open. */
   readonly #own: string[][] = [];
 
@@ -75,8 +79,9 @@ class Prefixes {
     for (const prefix of this.#own.pop()!) this.#bound.get(prefix)!.pop();
   }
 
+  /** Undefined if nothing declares it. */
   of(prefix: string): string | undefined {
-    return this.#bound.get(prefix)?.at(-1);
+    return this.#bound.get(prefix)?.at(-1) || undefined;
   }
 }
 
@@ -89,8 +94,12 @@ function withoutPrefixes(name: string, text: string): string {
   for (const tag of xml.tags()) {
     const { prefix, isEnd, at } = tag;
     if (!isEnd) prefixes.begin(tag);
-    const isOwn = prefix === "" || collada.test(prefixes.of(prefix) ?? "");
-    if (!isEnd && depth === 0 && !isOwn) throw xml.fault(at, wrongRoot(tag, prefixes.of(prefix)));
+    const bound = prefixes.of(prefix);
+    const isOwn = prefix === "" || collada.test(bound ?? "");
+    if (!isEnd && depth === 0 && !isOwn) throw xml.fault(at, wrongRoot(tag, bound));
+    if (!isEnd && prefix !== "" && bound === undefined) {
+      throw xml.fault(at, `<${prefix}:${tag.name}> has the prefix “${prefix}”, which nothing declares`);
+    }
     if (others === 0 && isOwn && prefix !== "" && at < tag.end) {
       const before = at + (isEnd ? 2 : 1);
       pieces.push(text.slice(end, before));

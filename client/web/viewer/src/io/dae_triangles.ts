@@ -2,31 +2,40 @@ import { FileFault } from "lpdeform-client/mesh/fault";
 import type { DaeMesh } from "./dae_faults.js";
 import { type FaceInput, type Faces, isVertex } from "./dae_polygons.js";
 import { triangulated } from "./triangulate.js";
+import type { XmlText } from "./xml.js";
 
 // The reader of three.js knows neither strips, fans nor holes, reads one of several <polygons>, and mixes up materials and attributes
 // that only some elements of a mesh have. So they all become <triangles>. Corners keep their normals, texture coordinates and colours.
 
 /** A page can handle no more. */
 const mostTriangles = 5_000_000;
-/** Of one polygon, and the sum of squares: so much time may the polygons of a file take. */
-const [mostCorners, mostWork] = [20_000, 5e8];
-/** A material that no file has: the reader gives the usual one. */
-const noMaterial = " ";
+/** Of one polygon, and the sum of squares: the polygons of a file take some 5 seconds at most. */
+const [mostCorners, mostWork] = [10_000, 5e8];
+/** A polygon that crosses itself takes about so many times as long as another one. From `fewCorners` on this counts. */
+const [crossingWork, fewCorners] = [10, 100];
 /** A semantic of which the reader knows nothing. */
 const unread = "NONE";
 
-/** The file with triangles, and what some faces had that is left out, in words. Throws a FileFault. */
-export function withTriangles(name: string, text: string, meshes: readonly DaeMesh[]): { text: string; left: Set<string> } {
+/** The file with triangles, and in words what some faces had that is left out, if anything. Throws a FileFault. */
+export function withTriangles(
+  name: string,
+  text: string,
+  meshes: readonly DaeMesh[],
+): { text: string; left: string | undefined } {
   const left = new Set<string>();
   const pieces: string[] = [];
   const most = { triangles: mostTriangles, work: mostWork };
+  let noMaterial: string | undefined;
   let end = 0;
   for (const mesh of meshes) {
-    const { kept, isLost } = keptKeys(mesh.faces, left);
-    const materials = mesh.faces.map(({ element }) => element.attributes["material"]);
+    const filled = mesh.faces.filter(({ indices }) => indices.length > 0);
+    const { kept, isLost } = keptKeys(filled, left);
+    const materials = filled.map(({ element }) => element.attributes["material"]);
     const isPlain = mesh.faces.every(({ element }) => element.name === "triangles");
     const isAlike = materials.every(Boolean) || !materials.some(Boolean);
-    if (isPlain && isAlike && !isLost) continue;
+    const hasEmpty = filled.length < mesh.faces.length;
+    if (isPlain && isAlike && !isLost && !hasEmpty) continue;
+    if (!isAlike) noMaterial ??= unusedMaterial(mesh.xml);
     for (const faces of mesh.faces) {
       if (faces.element.at < end) continue; // it stands in other faces, where the reader does not look
       const corners = cornersOf(mesh, faces, most);
@@ -39,7 +48,17 @@ export function withTriangles(name: string, text: string, meshes: readonly DaeMe
     }
   }
   pieces.push(text.slice(end));
-  return { text: pieces.join(""), left };
+  const words = [...left].join(", ").replace(/, (?=[^,]*$)/, " and ");
+  return { text: pieces.join(""), left: left.size > 0 ? `${words} that only some of its faces have` : undefined };
+}
+
+/** A material that the file does not have: the reader gives the usual one. */
+function unusedMaterial(xml: XmlText): string {
+  const used = new Set<string | undefined>();
+  for (const { attributes } of xml.tags()) used.add(attributes["symbol"]).add(attributes["material"]);
+  let number = 0;
+  while (used.has(`none-${number}`)) ++number;
+  return `none-${number}`;
 }
 
 /** An attribute as the reader tells it from others. */
@@ -68,7 +87,7 @@ function keptKeys(all: readonly Faces[], left: Set<string>): { kept: Set<string>
     if (found.every(({ source }) => source.stride === stride) && (isFilled || found.length === all.length)) kept.add(key);
     else {
       isLost = true;
-      left.add(`${attributes[key]} that only some faces have`);
+      left.add(attributes[key]!);
     }
   }
   return { kept, isLost };
@@ -94,12 +113,16 @@ function cornersOf({ xml, called, places }: DaeMesh, faces: Faces, most: { trian
       for (let k = begin; k < begin + count; ++k) for (let n = 0; n < 3; ++n) points.push(places[3 * vertexOf(k) + n]!);
       const found = triangulated(points, holes.get(item) ?? [count]);
       if (!found) throw fault("with a hole that does not lie within its outline, or crosses it or another hole");
+      if (count > fewCorners && isFan(found)) most.work -= (crossingWork - 1) * count ** 2;
       for (const corner of found) corners.push(begin + corner);
     }
     begin += count;
   });
   return corners;
 }
+
+/** So a polygon is parted that crosses itself. */
+const isFan = (triangles: readonly number[]) => triangles.every((corner, k) => k % 3 > 0 || corner === 0);
 
 /** Without the triangles of two corners that join strips. */
 function addStrip(

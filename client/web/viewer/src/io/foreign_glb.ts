@@ -61,7 +61,7 @@ const readers: Record<Kind, Reader> = {
     const { ColladaLoader } = await import("three/addons/loaders/ColladaLoader.js");
     const plain = plainDae(name, xmlText(bytes));
     const { text, left } = withTriangles(name, plain, checkDae(name, plain));
-    for (const what of left) lost.add(what);
+    if (left) lost.add(left);
     const read = new ColladaLoader(nothingElse()).parse(text, "");
     if (!read?.scene) throw new Error("its XML is broken");
     return read.scene;

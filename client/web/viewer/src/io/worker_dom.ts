@@ -15,7 +15,12 @@ function found(root: Document | Element, selector: string): Element[] {
 }
 
 for (const { prototype } of [Document, Element]) {
+  const { getElementsByTagName } = prototype;
   Object.assign(prototype, {
+    /** As they are now. Those of xmldom are all sought again when an element gets an attribute, as each node without an id does. */
+    getElementsByTagName(this: Document | Element, name: string) {
+      return [...getElementsByTagName.call(this, name)];
+    },
     querySelectorAll(this: Document | Element, selector: string) {
       return found(this, selector);
     },

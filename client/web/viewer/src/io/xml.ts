@@ -33,6 +33,9 @@ const others = [
   ["<!", ">"],
 ] as const;
 
+/** Elements in each other. In a worker of Chromium the readers of three.js run out of stack between 700 and 850. */
+const mostDepth = 500;
+
 export class XmlText {
   /** `name`: of the file, and of the part of it. */
   constructor(
@@ -61,6 +64,7 @@ export class XmlText {
       const isOther = text[at + 1] === "!" || text[at + 1] === "?";
       const other = isOther && others.find(([begin]) => text.startsWith(begin, at));
       if (other) {
+        if (other[0] === "<!") this.#checkDoctype(at, hasRoot);
         const end = text.indexOf(other[1], at + other[0].length);
         if (end < 0) throw this.fault(at, `${other[0]} has no ${other[1]} after it`);
         at = end + other[1].length;
@@ -82,6 +86,9 @@ export class XmlText {
       } else {
         const attributes = attributesIn(inner!);
         if (hasRoot && open.length === 0) throw this.fault(at, `<${full}> comes after the end of the XML`);
+        if (open.length >= mostDepth) {
+          throw this.fault(at, `<${full}> lies in ${mostDepth} other elements; this page reads no deeper`);
+        }
         hasRoot = true;
         yield { name, prefix, attributes, isEnd: false, at, end };
         if (inner!.endsWith("/")) yield { name, prefix, attributes, isEnd: true, at: end, end };
@@ -91,6 +98,14 @@ export class XmlText {
     }
     const last = open.at(-1);
     if (last) throw this.cut(`<${last.name}> of line ${this.lineOf(last.at)}`);
+  }
+
+  /** Throws a FileFault if what begins with “<!” is no DOCTYPE, or comes after the first element. */
+  #checkDoctype(at: number, hasRoot: boolean): void {
+    const [mark] = /^<!\w*/.exec(this.text.slice(at, at + 20))!;
+    if (/^<!doctype$/i.test(mark) && mark !== "<!DOCTYPE") throw this.fault(at, `${mark} must be in capitals: <!DOCTYPE`);
+    if (mark !== "<!DOCTYPE") throw this.fault(at, `${mark} cannot stand here`);
+    if (hasRoot) throw this.fault(at, "a DOCTYPE can stand before the first element only");
   }
 
   /** The outermost element. Throws a FileFault if there is none. */

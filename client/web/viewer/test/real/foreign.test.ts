@@ -95,6 +95,14 @@ describe("the viewer", () => {
     expect(user.errors).toEqual([]);
   });
 
+  it("opens nodes that lie as deep in each other as a file may have them", async () => {
+    const dae = makeDae()
+      .replace("<node ", `${"<node>".repeat(490)}<node `)
+      .replace("</node>", "</node>".repeat(491));
+    await user.openFiles({ name: "deep.dae", content: Buffer.from(dae) });
+    await notice("deep.dae is opened as deep.glb.");
+  });
+
   it("loads nothing that a file names, and says what is left out", async () => {
     const asked: string[] = [];
     user.page.on("request", (request) => asked.push(request.url()));
