@@ -39,6 +39,7 @@ function fakeApp(vertices: number) {
     view: new State(firstView),
     facts,
     history,
+    onCancel: new Set<() => boolean>(),
     panes: [{ live: { isSettling: false }, frame: { isFinal: true } }],
     get mesh() {
       return facts.now.mesh;
@@ -184,4 +185,45 @@ it("a server that has no room is asked again when the slider is used, and not be
   await idle();
   expect(sessions).toHaveLength(1);
   expect(blend.facts.now.fault).toBe("");
+});
+
+it("a press that is cancelled shows nothing any more and changes nothing; the next one does", async () => {
+  open(100);
+  await idle();
+  for (const _ of blendPs) await solve();
+  const cancel = () => [...app.onCancel].map((one) => one());
+  const { document: before } = app;
+  blend.begin();
+  blend.show(8);
+  expect(cancel()).toEqual([true]);
+  expect(app.endPreview).toHaveBeenLastCalledWith(false);
+  expect(cancel()).toEqual([false]);
+  app.preview.mockClear();
+  expect(blend.show(6)).toBeUndefined(); // the pointer goes on
+  expect(app.preview).not.toHaveBeenCalled();
+  blend.release();
+  expect(app.document).toBe(before);
+  blend.begin();
+  blend.show(6);
+  blend.release();
+  expect(app.document.p).toBe(6);
+});
+
+it("p that becomes automatic, another p and another mesh end the press", async () => {
+  open(100);
+  const held = [
+    () => app.change({ ...app.document, isAutomatic: true }),
+    () => app.change({ ...app.document, isAutomatic: false, p: 4 }),
+    () => app.facts.set({ mesh: meshOf(50) }),
+  ];
+  for (const change of held) {
+    blend.begin();
+    blend.show(8);
+    change();
+    const { document: before } = app;
+    expect(blend.show(7)).toBeUndefined();
+    expect(blend.facts.now.held).toBeUndefined();
+    blend.release();
+    expect(app.document).toBe(before);
+  }
 });

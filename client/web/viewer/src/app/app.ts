@@ -43,6 +43,8 @@ export class App implements Workbench {
   edge = 0;
   /** Called after each picture that was drawn. */
   readonly afterDrawing = new Set<(now: number) => void>();
+  /** Each ends something that is under way outside the history; true if there was something. */
+  readonly onCancel = new Set<() => boolean>();
   #seams: Seams | undefined;
   #watched: string | undefined;
   #wishedWelding: Welding | undefined;
@@ -376,7 +378,8 @@ export class App implements Workbench {
   /** Like cancelGesture(), and also ends drags by the pointer in every picture. */
   cancelAll(): boolean {
     const held = [...this.#editings].map((editing) => editing.cancel());
-    return this.cancelGesture() || held.includes(true);
+    const others = [...this.onCancel].map((cancel) => cancel());
+    return this.cancelGesture() || [...held, ...others].includes(true);
   }
 
   /** What the pointer has done so far is in the document, for whoever saves it. */

@@ -13,36 +13,41 @@ const leastSeconds = 5;
 /** One slider from paper to rubber. */
 export function blendPanel(app: App): HTMLElement {
   const blend = new Blend(app);
-  const status = el("p", { className: "quiet" });
+  const status = el("p", { className: "quiet readiness" });
   const said = el("p", { className: "quiet", role: "status" });
   const say = (words: string) => {
     setText(said, words);
     status.hidden = words !== "";
   };
-  let p = app.document.p;
   const { element, show } = slider(
     "Blend p",
     0,
     1,
     0.002,
     (share) => {
-      p = pAt(share);
+      const p = pAt(share);
+      const found = blend.show(p);
+      if (blend.facts.now.held === undefined) return showOwn();
       show(share, short(p));
-      say(wordsOf(p, blend.show(p)));
+      say(wordsOf(p, found));
     },
-    () => {
-      blend.release(p);
-      say("");
-    },
+    () => blend.release(),
+    () => blend.begin(),
   );
+  const showOwn = () => {
+    const { p } = app.document;
+    show(shareOf(p), short(p));
+    say("");
+  };
   element.title = "Passes through the shapes of all p at once, in the first picture";
   const input = element.querySelector("input")!;
   app.facts.watch(
     ({ document }) => [document.p],
-    ([now]) => {
-      p = now;
-      show(shareOf(now), short(now));
-    },
+    () => showOwn(),
+  );
+  blend.facts.watch(
+    ({ held }) => [held],
+    ([held]) => held === undefined && showOwn(),
   );
   const showStatus = () => {
     const { isAutomatic, handles } = app.document;
