@@ -1,4 +1,5 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
+import { LpdeformError } from "lpdeform-client";
 import { Blend, mostUnasked } from "../src/app/blend.js";
 import type { App } from "../src/app/app.js";
 import { firstFacts } from "../src/app/facts.js";
@@ -173,10 +174,13 @@ it("a page that is hidden, and another mesh, end the session", async () => {
 it("a server that has no room is asked again when the slider is used, and not before", async () => {
   open(100);
   vi.mocked(shapesOf).mockImplementationOnce(() => {
-    throw new Error("The server is full");
+    throw new LpdeformError(
+      "resource_exhausted",
+      "The server has all of its 1 sessions in use; try again after the time given.",
+    );
   });
   await idle();
-  expect(blend.facts.now.fault).toBe("The server is full.");
+  expect(blend.facts.now.fault).toBe("The server has no room for it now.");
   app.change({ ...app.document, p: 4 });
   await idle();
   await idle();
@@ -226,4 +230,32 @@ it("p that becomes automatic, another p and another mesh end the press", async (
     blend.release();
     expect(app.document).toBe(before);
   }
+});
+
+it("none are prepared while poses are exported, and what is prepared then ends", async () => {
+  open(100);
+  await idle();
+  app.facts.set({ isFilming: true });
+  await idle();
+  await idle();
+  expect(sessions).toEqual([{ ps: blendPs, isOver: true }]);
+  app.facts.set({ isFilming: false });
+  await idle();
+  expect(sessions).toHaveLength(2);
+});
+
+it("while the server is away, nothing is prepared, no time is told and no timer runs; it goes on when the server is back", async () => {
+  open(100);
+  await idle();
+  await solve();
+  expect(blend.facts.now.secondsLeft).toBeDefined();
+  app.facts.set({ status: say("away", "The server is away") });
+  await vi.advanceTimersByTimeAsync(0);
+  expect(sessions[0]!.isOver).toBe(true);
+  expect(blend.facts.now).toMatchObject({ ready: 1, secondsLeft: undefined });
+  await idle();
+  expect(vi.getTimerCount()).toBe(0);
+  app.facts.set({ status: say("live", "Live") });
+  await idle();
+  expect(sessions[1]!.ps).toEqual(blendPs);
 });

@@ -507,15 +507,22 @@ export class App implements Workbench {
 
   // The panes.
 
-  /** Shows a shape in the first picture in place of the server's frames, until endPreview(). */
-  preview(shape: Shape): void {
+  /** Shows a shape in the first picture in place of the server's frames, until endPreview(). `p`: of the shape, if controls show it. */
+  preview(shape: Shape, p?: number): void {
     this.panes[0]!.preview(shape);
+    this.#sayPreview(p);
     this.#needsColours = true;
     this.requestDraw();
   }
 
+  #sayPreview(previewP: number | undefined): void {
+    this.facts.set({ previewP });
+    this.#panes.label(this.document, previewP);
+  }
+
   endPreview(withNextFrame: boolean): void {
     this.panes[0]!.endPreview(withNextFrame);
+    this.#sayPreview(undefined);
     this.#needsColours = true;
     this.requestDraw();
   }

@@ -67,7 +67,7 @@ export class Blend {
       () => this.cancel(),
     );
     app.facts.watch(
-      ({ document }) => [document],
+      ({ document, isFilming, problem, status }) => [document, isFilming, problem, status.kind],
       () => this.#soon(),
     );
     app.onCancel.add(() => this.cancel());
@@ -88,7 +88,7 @@ export class Blend {
     this.facts.set({ held: p });
     if (this.facts.now.waitsForUse || this.facts.now.fault) this.#ask();
     const found = blended(this.#shapes, p);
-    if (found) this.app.preview(found.shape);
+    if (found) this.app.preview(found.shape, found.low < found.high ? p : found.low);
     return found;
   }
 
@@ -134,20 +134,27 @@ export class Blend {
     const { document: work, mesh } = this.app;
     const isPossible = !work.isAutomatic && work.handles.length > 0;
     const waitsForUse = isPossible && !this.#isAsked && mesh.positions.length > 3 * mostUnasked;
-    this.facts.set({ waitsForUse });
+    this.facts.set({ waitsForUse, secondsLeft: undefined });
     const isLeft = this.#shapes.size < blendPs.length && this.facts.now.fault === "";
-    if (isPossible && !waitsForUse && isLeft && document.visibilityState !== "hidden") this.#later();
+    const isWanted = isPossible && !waitsForUse && isLeft && document.visibilityState !== "hidden";
+    if (isWanted && this.#mayBecomeQuiet) this.#later();
   }
 
   #later(): void {
     this.#timer = setTimeout(() => (this.#isQuiet ? void this.#prepare() : this.#later()), idleMs);
   }
 
+  /** Otherwise this is tried again when these facts have changed. */
+  get #mayBecomeQuiet(): boolean {
+    const { isFilming, problem, status } = this.app.facts.now;
+    return status.kind === "live" && problem === undefined && !isFilming;
+  }
+
   /** Whether no drag is under way, and the server has solved for all that is shown. */
   get #isQuiet(): boolean {
-    const { facts, history, panes } = this.app;
+    const { history, panes } = this.app;
     const isSolved = panes.every(({ live, frame }) => live && !live.isSettling && frame?.isFinal);
-    return facts.now.status.kind === "live" && history.settled === history.present && isSolved;
+    return history.settled === history.present && isSolved;
   }
 
   async #prepare(): Promise<void> {
@@ -166,7 +173,11 @@ export class Blend {
         this.facts.set({ ready: this.#shapes.size, secondsLeft });
       }
     } catch (thrown) {
-      if (!signal.aborted) this.facts.set({ fault: sentence((thrown as LpdeformError).message) });
+      if (!signal.aborted) this.facts.set({ fault: faultOf(thrown as LpdeformError) });
     }
   }
+}
+
+function faultOf({ code, message }: LpdeformError): string {
+  return code === "resource_exhausted" ? "The server has no room for it now." : sentence(message);
 }

@@ -56,7 +56,10 @@ export function blendPanel(app: App): HTMLElement {
     setText(status, statusOf(app, blend));
   };
   blend.facts.watchAll(showStatus);
-  app.facts.watch(({ mesh, document }) => [mesh, document.isAutomatic, document.handles.length], showStatus);
+  app.facts.watch(
+    ({ mesh, document, status }) => [mesh, document.isAutomatic, document.handles.length, status.kind],
+    showStatus,
+  );
   const ends = el("p", { className: "ends quiet" }, el("span", {}, "paper, p = 1"), el("span", {}, `rubber, p = ${mostP}`));
   return el("div", { className: "blend" }, element, ends, el("div", { className: "told" }, status, said));
 }
@@ -70,9 +73,10 @@ function statusOf(app: App, blend: Blend): string {
   const all = blendPs.length;
   if (waitsForUse) {
     const count = (app.mesh.positions.length / 3).toLocaleString("en");
-    return `Moving it has the server solve for ${all} values of p, which takes long with ${count} vertices.`;
+    return `For ${count} vertices, shapes are prepared once you move the slider.`;
   }
   if (ready === all) return "All shapes are ready.";
+  if (app.facts.now.status.kind !== "live") return `${ready} of ${all} shapes are ready. The others wait for the server.`;
   const isLong = secondsLeft !== undefined && secondsLeft >= leastSeconds;
   return `${ready} of ${all} shapes are ready${isLong ? `, the others in about ${Math.ceil(secondsLeft)} s` : ""}.`;
 }

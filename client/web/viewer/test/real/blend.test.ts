@@ -44,6 +44,13 @@ it("with nothing pressed, a slider passes through prepared shapes without a solv
   expect(await user.ask("document().p")).toBe(1.5); // not yet
   await move(4.9);
   expect(await said.textContent()).toBe("Interpolated between p = 4 and 6; solved when you let go.");
+  const controls = async () => [
+    await user.page.getByRole("slider", { name: "p", exact: true }).getAttribute("aria-valuetext"),
+    await user.page.locator(".p-words").textContent(),
+    await user.page.locator("canvas.stage").getAttribute("aria-label"),
+  ];
+  const everyPlace = "No peaks: every place gives a little";
+  expect(await controls()).toEqual(["4.9", everyPlace, "Picture of the surface, p = 4.9"]);
   const at5 = await shown();
   expect(await sent()).toBe(asked);
   await blend().dispatchEvent("change");
@@ -112,6 +119,8 @@ it("Escape ends the preview without a change, and other keys leave it as it is",
   const own = await blend().inputValue();
   await at(0.9);
   expect(await blend().inputValue()).toBe(own);
+  const label = await user.page.locator("canvas.stage").getAttribute("aria-label");
+  expect(label).toBe("Picture of the surface, p = 1.5");
   await mouse.up();
   expect(await work()).toEqual(before);
   expect(await shown()).toEqual(rest);
