@@ -1,4 +1,5 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
+import { LpdeformError } from "lpdeform-client";
 import { Blend, mostUnasked } from "../src/app/blend.js";
 import type { App } from "../src/app/app.js";
 import { firstFacts } from "../src/app/facts.js";
@@ -39,6 +40,7 @@ function fakeApp(vertices: number) {
     view: new State(firstView),
     facts,
     history,
+    onCancel: new Set<() => boolean>(),
     panes: [{ live: { isSettling: false }, frame: { isFinal: true } }],
     get mesh() {
       return facts.now.mesh;
@@ -172,10 +174,13 @@ it("a page that is hidden, and another mesh, end the session", async () => {
 it("a server that has no room is asked again when the slider is used, and not before", async () => {
   open(100);
   vi.mocked(shapesOf).mockImplementationOnce(() => {
-    throw new Error("The server is full");
+    throw new LpdeformError(
+      "resource_exhausted",
+      "The server has all of its 1 sessions in use; try again after the time given.",
+    );
   });
   await idle();
-  expect(blend.facts.now.fault).toBe("The server is full.");
+  expect(blend.facts.now.fault).toBe("The server has no room for it now.");
   app.change({ ...app.document, p: 4 });
   await idle();
   await idle();
@@ -184,4 +189,73 @@ it("a server that has no room is asked again when the slider is used, and not be
   await idle();
   expect(sessions).toHaveLength(1);
   expect(blend.facts.now.fault).toBe("");
+});
+
+it("a press that is cancelled shows nothing any more and changes nothing; the next one does", async () => {
+  open(100);
+  await idle();
+  for (const _ of blendPs) await solve();
+  const cancel = () => [...app.onCancel].map((one) => one());
+  const { document: before } = app;
+  blend.begin();
+  blend.show(8);
+  expect(cancel()).toEqual([true]);
+  expect(app.endPreview).toHaveBeenLastCalledWith(false);
+  expect(cancel()).toEqual([false]);
+  app.preview.mockClear();
+  expect(blend.show(6)).toBeUndefined(); // the pointer goes on
+  expect(app.preview).not.toHaveBeenCalled();
+  blend.release();
+  expect(app.document).toBe(before);
+  blend.begin();
+  blend.show(6);
+  blend.release();
+  expect(app.document.p).toBe(6);
+});
+
+it("p that becomes automatic, another p and another mesh end the press", async () => {
+  open(100);
+  const held = [
+    () => app.change({ ...app.document, isAutomatic: true }),
+    () => app.change({ ...app.document, isAutomatic: false, p: 4 }),
+    () => app.facts.set({ mesh: meshOf(50) }),
+  ];
+  for (const change of held) {
+    blend.begin();
+    blend.show(8);
+    change();
+    const { document: before } = app;
+    expect(blend.show(7)).toBeUndefined();
+    expect(blend.facts.now.held).toBeUndefined();
+    blend.release();
+    expect(app.document).toBe(before);
+  }
+});
+
+it("none are prepared while poses are exported, and what is prepared then ends", async () => {
+  open(100);
+  await idle();
+  app.facts.set({ isFilming: true });
+  await idle();
+  await idle();
+  expect(sessions).toEqual([{ ps: blendPs, isOver: true }]);
+  app.facts.set({ isFilming: false });
+  await idle();
+  expect(sessions).toHaveLength(2);
+});
+
+it("while the server is away, nothing is prepared, no time is told and no timer runs; it goes on when the server is back", async () => {
+  open(100);
+  await idle();
+  await solve();
+  expect(blend.facts.now.secondsLeft).toBeDefined();
+  app.facts.set({ status: say("away", "The server is away") });
+  await vi.advanceTimersByTimeAsync(0);
+  expect(sessions[0]!.isOver).toBe(true);
+  expect(blend.facts.now).toMatchObject({ ready: 1, secondsLeft: undefined });
+  await idle();
+  expect(vi.getTimerCount()).toBe(0);
+  app.facts.set({ status: say("live", "Live") });
+  await idle();
+  expect(sessions[1]!.ps).toEqual(blendPs);
 });

@@ -14,7 +14,7 @@ export interface Mesh {
   corners?: Uint32Array;
   /** Other contents of the file, in words: "texture coordinates". */
   beside?: readonly string[];
-  /** What the scene of a glTF draws and what stays as it is, such as lines, one sentence each. */
+  /** What of a glTF's scene stays as it is, such as lines, and corners left over, one sentence each. */
   notices?: readonly string[];
   /** The OBJ file itself, so that its other contents can be saved with it. */
   obj?: Uint8Array;

@@ -43,6 +43,8 @@ export class App implements Workbench {
   edge = 0;
   /** Called after each picture that was drawn. */
   readonly afterDrawing = new Set<(now: number) => void>();
+  /** Each ends something that is under way outside the history; true if there was something. */
+  readonly onCancel = new Set<() => boolean>();
   #seams: Seams | undefined;
   #watched: string | undefined;
   #wishedWelding: Welding | undefined;
@@ -376,7 +378,8 @@ export class App implements Workbench {
   /** Like cancelGesture(), and also ends drags by the pointer in every picture. */
   cancelAll(): boolean {
     const held = [...this.#editings].map((editing) => editing.cancel());
-    return this.cancelGesture() || held.includes(true);
+    const others = [...this.onCancel].map((cancel) => cancel());
+    return this.cancelGesture() || [...held, ...others].includes(true);
   }
 
   /** What the pointer has done so far is in the document, for whoever saves it. */
@@ -504,15 +507,22 @@ export class App implements Workbench {
 
   // The panes.
 
-  /** Shows a shape in the first picture in place of the server's frames, until endPreview(). */
-  preview(shape: Shape): void {
+  /** Shows a shape in the first picture in place of the server's frames, until endPreview(). `p`: of the shape, if controls show it. */
+  preview(shape: Shape, p?: number): void {
     this.panes[0]!.preview(shape);
+    this.#sayPreview(p);
     this.#needsColours = true;
     this.requestDraw();
   }
 
+  #sayPreview(previewP: number | undefined): void {
+    this.facts.set({ previewP });
+    this.#panes.label(this.document, previewP);
+  }
+
   endPreview(withNextFrame: boolean): void {
     this.panes[0]!.endPreview(withNextFrame);
+    this.#sayPreview(undefined);
     this.#needsColours = true;
     this.requestDraw();
   }

@@ -15,6 +15,8 @@ export const mostUnasked = 20_000;
 const framesPerSecond = 10;
 
 export interface BlendFacts {
+  /** The p at which the slider is held. */
+  held: number | undefined;
   /** Whether the mesh is so large that the slider must be used first. */
   waitsForUse: boolean;
   /** How many shapes are ready. */
@@ -35,11 +37,19 @@ function workOf({ handles, paintedP, stiffness, region, isAutomatic }: Document)
  * a session for it only while it solves: any change of the document, and a page that is not seen, end it.
  */
 export class Blend {
-  readonly facts = new State<BlendFacts>({ waitsForUse: false, ready: 0, secondsLeft: undefined, fault: "" });
+  readonly facts = new State<BlendFacts>({
+    held: undefined,
+    waitsForUse: false,
+    ready: 0,
+    secondsLeft: undefined,
+    fault: "",
+  });
   /** In the order of blendPs. */
   #shapes = new Map<number, Shape>();
   /** Whether the slider was used since the work has changed. */
   #isAsked = false;
+  /** Whether the press of the slider was cancelled and goes on without effect. */
+  #isCancelled = false;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #run = new AbortController();
 
@@ -53,25 +63,53 @@ export class Blend {
       () => this.#drop(),
     );
     app.facts.watch(
-      ({ document }) => [document],
+      ({ document }) => [document.p],
+      () => this.cancel(),
+    );
+    app.facts.watch(
+      ({ document, isFilming, problem, status }) => [document, isFilming, problem, status.kind],
       () => this.#soon(),
     );
+    app.onCancel.add(() => this.cancel());
     document.addEventListener("visibilitychange", () => this.#soon());
   }
 
-  /** Shows the shape at p in the first picture, until release(). Undefined if none is ready; then they are prepared from now on. */
+  /** The slider is pressed anew. */
+  begin(): void {
+    this.#isCancelled = false;
+  }
+
+  /**
+   * Shows the shape at p in the first picture, until release() or cancel(). Undefined if none is ready; then they are prepared from
+   * now on. Undefined and without effect, too, in a press that was cancelled.
+   */
   show(p: number): Blended | undefined {
+    if (this.#isCancelled) return undefined;
+    this.facts.set({ held: p });
     if (this.facts.now.waitsForUse || this.facts.now.fault) this.#ask();
     const found = blended(this.#shapes, p);
-    if (found) this.app.preview(found.shape);
+    if (found) this.app.preview(found.shape, found.low < found.high ? p : found.low);
     return found;
   }
 
-  /** Solves for p; until its first frame comes, the shape that was shown stays. */
-  release(p: number): void {
+  /** Solves for the p at which the slider was held; until its first frame comes, the shape that was shown stays. */
+  release(): void {
     const { app } = this;
+    const { held: p } = this.facts.now;
+    this.#isCancelled = false;
+    if (p === undefined) return;
+    this.facts.set({ held: undefined });
     app.endPreview(app.document.p !== p);
     if (app.document.p !== p) app.change({ ...app.document, p });
+  }
+
+  /** Ends the press of the slider without a change. False if there is none. */
+  cancel(): boolean {
+    if (this.facts.now.held === undefined) return false;
+    this.#isCancelled = true;
+    this.facts.set({ held: undefined });
+    this.app.endPreview(false);
+    return true;
   }
 
   #ask(): void {
@@ -84,7 +122,7 @@ export class Blend {
   #drop(): void {
     this.#shapes.clear();
     this.#isAsked = false;
-    this.app.endPreview(false);
+    if (!this.cancel()) this.app.endPreview(false);
     this.facts.set({ ready: 0, secondsLeft: undefined, fault: "" });
     this.#soon();
   }
@@ -96,20 +134,27 @@ export class Blend {
     const { document: work, mesh } = this.app;
     const isPossible = !work.isAutomatic && work.handles.length > 0;
     const waitsForUse = isPossible && !this.#isAsked && mesh.positions.length > 3 * mostUnasked;
-    this.facts.set({ waitsForUse });
+    this.facts.set({ waitsForUse, secondsLeft: undefined });
     const isLeft = this.#shapes.size < blendPs.length && this.facts.now.fault === "";
-    if (isPossible && !waitsForUse && isLeft && document.visibilityState !== "hidden") this.#later();
+    const isWanted = isPossible && !waitsForUse && isLeft && document.visibilityState !== "hidden";
+    if (isWanted && this.#mayBecomeQuiet) this.#later();
   }
 
   #later(): void {
     this.#timer = setTimeout(() => (this.#isQuiet ? void this.#prepare() : this.#later()), idleMs);
   }
 
+  /** Otherwise this is tried again when these facts have changed. */
+  get #mayBecomeQuiet(): boolean {
+    const { isFilming, problem, status } = this.app.facts.now;
+    return status.kind === "live" && problem === undefined && !isFilming;
+  }
+
   /** Whether no drag is under way, and the server has solved for all that is shown. */
   get #isQuiet(): boolean {
-    const { facts, history, panes } = this.app;
+    const { history, panes } = this.app;
     const isSolved = panes.every(({ live, frame }) => live && !live.isSettling && frame?.isFinal);
-    return facts.now.status.kind === "live" && history.settled === history.present && isSolved;
+    return history.settled === history.present && isSolved;
   }
 
   async #prepare(): Promise<void> {
@@ -128,7 +173,11 @@ export class Blend {
         this.facts.set({ ready: this.#shapes.size, secondsLeft });
       }
     } catch (thrown) {
-      if (!signal.aborted) this.facts.set({ fault: sentence((thrown as LpdeformError).message) });
+      if (!signal.aborted) this.facts.set({ fault: faultOf(thrown as LpdeformError) });
     }
   }
+}
+
+function faultOf({ code, message }: LpdeformError): string {
+  return code === "resource_exhausted" ? "The server has no room for it now." : sentence(message);
 }

@@ -14,6 +14,10 @@ export interface Facts {
   mesh: Mesh;
   report: MeshReport | undefined;
   status: Status;
+  /** The p of what the first picture shows in place of the server's frames, while the blend slider is held. */
+  previewP: number | undefined;
+  /** Whether poses are being exported. */
+  isFilming: boolean;
   /** How the solve goes on for which the user waits. */
   solving: Solving;
   /** Why the newest change cannot be shown. */
@@ -43,6 +47,8 @@ export const firstFacts: Facts = {
   mesh: noMesh,
   report: undefined,
   status: say("idle", ""),
+  previewP: undefined,
+  isFilming: false,
   solving: undefined,
   problem: undefined,
   notice: undefined,

@@ -123,7 +123,7 @@ export class Files {
     const read = async () => {
       const { glbOf } = await import("../io/foreign.js");
       const { glb, left } = await glbOf(file);
-      const gone = left.length > 0 ? `Its ${left.join(" and ")} are not taken over. ` : "";
+      const gone = left.length > 0 ? `Left out: ${left.join(", ")}. ` : "";
       first = `${file.name} is opened as ${glb.name}. ${gone}`;
       return openedMesh(glb, []);
     };
@@ -281,19 +281,11 @@ export class Files {
   }
 }
 
-/** How many parts that stay as they are the page names. */
-const mostNotices = 3;
-
-/** What of the file stays as it is. */
+/** How many parts stay as they are; the panel has a sentence on each. */
 function stillIn({ notices = [] }: Mesh): string {
-  const others = notices.length - mostNotices;
-  const more = others > 0 ? ` So ${others === 1 ? "does another part" : `do ${others.toLocaleString("en")} other parts`}.` : "";
-  return (
-    notices
-      .slice(0, mostNotices)
-      .map((notice) => ` ${notice}`)
-      .join("") + more
-  );
+  if (notices.length === 0) return "";
+  if (notices.length === 1) return " A part of it stays as it is: the panel “Mesh” names it.";
+  return ` ${notices.length.toLocaleString("en")} parts of it stay as they are: the panel “Mesh” names them.`;
 }
 
 /** Puts the file's name before what is wrong with it. */

@@ -54,15 +54,17 @@ async function film(app: App, signal: AbortSignal): Promise<Film | undefined> {
 }
 
 /** Aborts when Escape is pressed, for as long as the work goes on. */
-async function untilEscape<Made>(work: (signal: AbortSignal) => Promise<Made>): Promise<Made> {
+async function untilEscape<Made>(app: App, work: (signal: AbortSignal) => Promise<Made>): Promise<Made> {
   const over = new AbortController();
   const stop = ({ code }: KeyboardEvent) => {
     if (code === "Escape") over.abort(new LpdeformError("cancelled", "Escape was pressed."));
   };
   window.addEventListener("keydown", stop);
+  app.facts.set({ isFilming: true });
   try {
     return await work(over.signal);
   } finally {
+    app.facts.set({ isFilming: false });
     window.removeEventListener("keydown", stop);
   }
 }
@@ -74,7 +76,7 @@ function sayChanged(app: App): undefined {
 /** The poses as a GLB with morph targets and an animation through them, shaded as on the page. Rejects after Escape, too. */
 export async function posesAsGlb(app: App): Promise<Uint8Array<ArrayBuffer> | undefined> {
   const { mesh } = app;
-  const made = await untilEscape((signal) => film(app, signal));
+  const made = await untilEscape(app, (signal) => film(app, signal));
   if (!made) return undefined;
   const { moments, shapes, seconds } = made;
   const { drawn } = derivedOf(mesh).shown;
@@ -87,7 +89,7 @@ export async function posesAsGlb(app: App): Promise<Uint8Array<ArrayBuffer> | un
  * too.
  */
 export function posesAsVideo(app: App): Promise<Blob | undefined> {
-  return untilEscape((signal) => filmed(app, signal));
+  return untilEscape(app, (signal) => filmed(app, signal));
 }
 
 async function filmed(app: App, signal: AbortSignal): Promise<Blob | undefined> {

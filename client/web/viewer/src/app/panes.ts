@@ -109,9 +109,14 @@ export class Panes {
 
   /** `time`: of the input that led to this document. */
   show(work: Document, time: number): void {
+    for (const { live } of this.all) live?.show(work, time);
+    this.label(work);
+  }
+
+  /** `firstP`: of what the first picture shows in place of the server's frames. */
+  label(work: Document, firstP = work.p): void {
     for (const pane of this.all) {
-      pane.live?.show(work, time);
-      const p = pane.side === "first" ? work.p : work.secondP;
+      const p = pane.side === "first" ? firstP : work.secondP;
       pane.element.dataset["label"] = pane.live?.watched
         ? "as it is shared"
         : work.isAutomatic

@@ -217,6 +217,7 @@ export class Surface {
     paint(this.#material, palette);
     if (wireframe) this.#findEdges();
     this.#wire.visible = wireframe;
+    if (ghost) this.#findGhostFaces();
     this.#ghost.visible = ghost;
     (this.#wire.material as three.LineBasicMaterial).color.set(isDark ? "#05070c" : "#1b2436");
     (this.#ghost.material as three.MeshBasicMaterial).color.set(isDark ? "#b9c6dc" : "#4f5d75");
@@ -252,15 +253,17 @@ export class Surface {
     geometry.boundingSphere = this.#geometry.boundingSphere;
   }
 
+  /** Once, when they are first needed, as in #findEdges(). */
+  #findGhostFaces(): void {
+    const { geometry } = this.#ghost;
+    if (geometry.index) return;
+    const { once, source } = this.#drawn;
+    const faces = once.map((vertex) => source[vertex]!);
+    geometry.setIndex(new three.BufferAttribute(faces, 1));
+  }
+
   #makeGhost(): three.Mesh {
     const geometry = new three.BufferGeometry();
-    const { once, source } = this.#drawn;
-    geometry.setIndex(
-      new three.BufferAttribute(
-        once.map((vertex) => source[vertex]!),
-        1,
-      ),
-    );
     geometry.setAttribute("position", new three.BufferAttribute(this.mesh.positions, 3));
     const { center, diagonal } = this.#derived.bounds;
     geometry.boundingSphere = new three.Sphere(new three.Vector3(...center), diagonal / 2);

@@ -13,36 +13,41 @@ const leastSeconds = 5;
 /** One slider from paper to rubber. */
 export function blendPanel(app: App): HTMLElement {
   const blend = new Blend(app);
-  const status = el("p", { className: "quiet" });
+  const status = el("p", { className: "quiet readiness" });
   const said = el("p", { className: "quiet", role: "status" });
   const say = (words: string) => {
     setText(said, words);
     status.hidden = words !== "";
   };
-  let p = app.document.p;
   const { element, show } = slider(
     "Blend p",
     0,
     1,
     0.002,
     (share) => {
-      p = pAt(share);
+      const p = pAt(share);
+      const found = blend.show(p);
+      if (blend.facts.now.held === undefined) return showOwn();
       show(share, short(p));
-      say(wordsOf(p, blend.show(p)));
+      say(wordsOf(p, found));
     },
-    () => {
-      blend.release(p);
-      say("");
-    },
+    () => blend.release(),
+    () => blend.begin(),
   );
+  const showOwn = () => {
+    const { p } = app.document;
+    show(shareOf(p), short(p));
+    say("");
+  };
   element.title = "Passes through the shapes of all p at once, in the first picture";
   const input = element.querySelector("input")!;
   app.facts.watch(
     ({ document }) => [document.p],
-    ([now]) => {
-      p = now;
-      show(shareOf(now), short(now));
-    },
+    () => showOwn(),
+  );
+  blend.facts.watch(
+    ({ held }) => [held],
+    ([held]) => held === undefined && showOwn(),
   );
   const showStatus = () => {
     const { isAutomatic, handles } = app.document;
@@ -51,7 +56,10 @@ export function blendPanel(app: App): HTMLElement {
     setText(status, statusOf(app, blend));
   };
   blend.facts.watchAll(showStatus);
-  app.facts.watch(({ mesh, document }) => [mesh, document.isAutomatic, document.handles.length], showStatus);
+  app.facts.watch(
+    ({ mesh, document, status }) => [mesh, document.isAutomatic, document.handles.length, status.kind],
+    showStatus,
+  );
   const ends = el("p", { className: "ends quiet" }, el("span", {}, "paper, p = 1"), el("span", {}, `rubber, p = ${mostP}`));
   return el("div", { className: "blend" }, element, ends, el("div", { className: "told" }, status, said));
 }
@@ -65,9 +73,10 @@ function statusOf(app: App, blend: Blend): string {
   const all = blendPs.length;
   if (waitsForUse) {
     const count = (app.mesh.positions.length / 3).toLocaleString("en");
-    return `Moving it has the server solve for ${all} values of p, which takes long with ${count} vertices.`;
+    return `For ${count} vertices, shapes are prepared once you move the slider.`;
   }
   if (ready === all) return "All shapes are ready.";
+  if (app.facts.now.status.kind !== "live") return `${ready} of ${all} shapes are ready. The others wait for the server.`;
   const isLong = secondsLeft !== undefined && secondsLeft >= leastSeconds;
   return `${ready} of ${all} shapes are ready${isLong ? `, the others in about ${Math.ceil(secondsLeft)} s` : ""}.`;
 }

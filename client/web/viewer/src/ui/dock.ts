@@ -1,4 +1,5 @@
 import type { App } from "../app/app.js";
+import type { Facts } from "../app/facts.js";
 import { placeOf, watchPlaces } from "../app/sides.js";
 import type { Document } from "../model/document.js";
 import { leastP, mostP, steppedP } from "../model/exponent.js";
@@ -21,6 +22,11 @@ export function pAt(share: number): number {
 
 type Field = "p" | "secondP";
 
+/** Of the first picture. */
+function shownP({ document, previewP }: Facts): number {
+  return previewP ?? document.p;
+}
+
 /** The slider of p at the lower edge (two of them in the split view), and automatic p. */
 export function dock(app: App): HTMLElement {
   const first = pSlider(app, "p");
@@ -32,9 +38,12 @@ export function dock(app: App): HTMLElement {
     "p and stiffness from the shape: joints soft, the parts between them rigid",
   );
   const hint = el("p", { className: "p-words" });
-  const explain = () => setText(hint, wordsOf(app.document, app.view.now.isSplit));
+  const explain = () => setText(hint, wordsOf({ ...app.document, p: shownP(app.facts.now) }, app.view.now.isSplit));
   app.facts.watch(
-    ({ document: { p, secondP, isAutomatic, paintedP, stiffness } }) => [isAutomatic, p, secondP, paintedP, stiffness],
+    (facts) => {
+      const { secondP, isAutomatic, paintedP, stiffness } = facts.document;
+      return [isAutomatic, shownP(facts), secondP, paintedP, stiffness];
+    },
     ([isAutomatic]) => {
       automatic.input.checked = isAutomatic;
       explain();
@@ -88,7 +97,7 @@ function pSlider(app: App, field: Field): HTMLElement {
     return tick;
   });
   app.facts.watch(
-    ({ document }) => [document[field], document.isAutomatic],
+    (facts) => [field === "p" ? shownP(facts) : facts.document[field], facts.document.isAutomatic],
     ([p, isAutomatic]) => {
       input.valueAsNumber = shareOf(p);
       input.style.setProperty("--share", `${shareOf(p) * 100}%`);

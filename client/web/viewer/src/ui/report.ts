@@ -35,6 +35,7 @@ export function warningsOf(report: MeshReport | undefined): Defect[] {
 export function reportPanel(app: App): HTMLElement {
   const summary = el("p", { className: "quiet" });
   const list = el("ul", { className: "warnings" });
+  const still = el("ul", { className: "still quiet", aria: { label: "What stays as it is" } });
   const seams = el("p", { className: "quiet" });
   const weld = toggle(
     "Weld seams",
@@ -89,10 +90,25 @@ export function reportPanel(app: App): HTMLElement {
     if (report && defects.length === 0 && !isTorn) list.append(el("li", { className: "good" }, "Nothing wrong with it."));
   };
   app.facts.watch(
+    ({ mesh }) => [mesh],
+    ([mesh]) => showStill(still, mesh),
+  );
+  app.facts.watch(
     ({ report, mesh }) => [report, mesh],
     ([report, mesh]) => showReport(report, mesh),
   );
-  return el("div", {}, summary, list, seamBox);
+  return el("div", {}, summary, list, seamBox, still);
+}
+
+/** More are counted. */
+const mostStill = 50;
+
+/** The parts of a glTF that stay as they are. */
+function showStill(list: HTMLElement, { notices = [] }: Mesh): void {
+  const more = notices.length - mostStill;
+  const words = [...notices.slice(0, mostStill), ...(more > 0 ? [`And ${more.toLocaleString("en")} more.`] : [])];
+  list.replaceChildren(...words.map((text) => el("li", {}, text)));
+  list.hidden = words.length === 0;
 }
 
 /** "zero_area_faces" as "zero area face" or "faces". */

@@ -12,7 +12,7 @@ beforeEach(async () => {
   await user.settled();
 });
 
-const status = () => user.page.locator(".blend .quiet").nth(1);
+const status = () => user.page.locator(".blend .readiness");
 const blend = () => user.page.getByRole("slider", { name: "Blend p" });
 const allReady = () => status().filter({ hasText: "All shapes are ready." }).waitFor({ timeout: 60_000 });
 const fewReady = () =>
@@ -28,7 +28,7 @@ it("with nothing pressed, a slider passes through prepared shapes without a solv
   expect(await blend().isVisible()).toBe(true);
   await allReady();
   const [before, asked] = [await shown(), await sent()];
-  const said = user.page.locator(".blend p").last();
+  const said = user.page.locator(".blend [role=status]");
   const move = (p: number) =>
     blend().evaluate(
       (input: HTMLInputElement, share) => {
@@ -44,6 +44,13 @@ it("with nothing pressed, a slider passes through prepared shapes without a solv
   expect(await user.ask("document().p")).toBe(1.5); // not yet
   await move(4.9);
   expect(await said.textContent()).toBe("Interpolated between p = 4 and 6; solved when you let go.");
+  const controls = async () => [
+    await user.page.getByRole("slider", { name: "p", exact: true }).getAttribute("aria-valuetext"),
+    await user.page.locator(".p-words").textContent(),
+    await user.page.locator("canvas.stage").getAttribute("aria-label"),
+  ];
+  const everyPlace = "No peaks: every place gives a little";
+  expect(await controls()).toEqual(["4.9", everyPlace, "Picture of the surface, p = 4.9"]);
   const at5 = await shown();
   expect(await sent()).toBe(asked);
   await blend().dispatchEvent("change");
@@ -84,4 +91,37 @@ it("the session for it is there while it solves, and ends with the last shape an
     document.dispatchEvent(new Event("visibilitychange"));
   });
   await expect.poll(() => count("DeleteSession"), { timeout: 20_000 }).toBe(2);
+});
+
+it("Escape ends the preview without a change, and other keys leave it as it is", async () => {
+  await allReady();
+  const { mouse, keyboard } = user.page;
+  const work = async () => [
+    await user.ask("document().p"),
+    await user.ask("app.history.stepsSoFar.past.length"),
+    await user.ask("app.view.now.selected"),
+  ];
+  const [before, rest] = [await work(), await shown()];
+  await blend().scrollIntoViewIfNeeded();
+  const { x, y, width, height } = (await blend().boundingBox())!;
+  const at = (share: number) => mouse.move(x + share * width, y + height / 2);
+  await at(0.3);
+  await mouse.down();
+  await at(0.8);
+  const held = await blend().inputValue();
+  await keyboard.press("Shift");
+  expect(await work()).toEqual(before);
+  expect(await shown()).not.toEqual(rest);
+  expect(await blend().inputValue()).toBe(held);
+  await keyboard.press("Escape");
+  expect(await work()).toEqual(before);
+  expect(await shown()).toEqual(rest);
+  const own = await blend().inputValue();
+  await at(0.9);
+  expect(await blend().inputValue()).toBe(own);
+  const label = await user.page.locator("canvas.stage").getAttribute("aria-label");
+  expect(label).toBe("Picture of the surface, p = 1.5");
+  await mouse.up();
+  expect(await work()).toEqual(before);
+  expect(await shown()).toEqual(rest);
 });

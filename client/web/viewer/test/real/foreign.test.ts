@@ -107,7 +107,7 @@ describe("the viewer", () => {
     const asked: string[] = [];
     user.page.on("request", (request) => asked.push(request.url()));
     await user.openFiles({ name: "tube.dae", content: files["tube.dae"] });
-    await notice("Its textures are not taken over.");
+    await notice("Left out: textures.");
     expect(asked.filter((url) => url.includes("example") || url.includes("a.png"))).toEqual([]);
   });
 

@@ -71,6 +71,11 @@ const messages = {
   },
   status: { kind: "away", title: "The server is away", text: "Your work is kept here. Reconnecting by itself…", element: "" },
 };
+/** Of a file whose name has no blank, and so long that no picture is left where nothing limits it. */
+const longNotice = {
+  ...messages.notice,
+  text: `${"a_name_".repeat(9)}.glb: 12,221 vertices, 317 of them copies along seams, welded: the panel “Mesh” has a switch. 12 parts of it stay as they are: the panel “Mesh” names them. Where 28 vertices of its borders lie near others it comes apart, unless “Weld within” in the panel “Mesh” joins them. Shown with z up, as it seems: “Y is up” in the panel turns it.`,
+};
 const nothingSaid = { setAside: [], better: [] };
 
 /** Pairs that overlap by more than a pixel of rounding, and what is cut off by the window. */
@@ -92,6 +97,12 @@ function faults([parts, beside]: readonly (readonly string[])[]): string[] {
   boxes.forEach(({ part, box, element }, k) => {
     if (box.left < -1 || box.top < -1 || box.right > innerWidth + 1 || box.bottom > innerHeight + 1)
       found.push(`${part} is cut off`);
+    if (part === ".notice") {
+      const words = document.createRange();
+      words.selectNodeContents(element);
+      const { left, right } = words.getBoundingClientRect();
+      if (left < box.left - 1 || right > box.right + 1) found.push("words of the notice are cut off");
+    }
     for (const other of boxes.slice(k + 1)) {
       if (part === ".pane" && !beside!.includes(other.part)) continue;
       if (element.contains(other.element) || other.element.contains(element)) continue;
@@ -219,6 +230,27 @@ it.each(sizes)(
         if (all.length > 0) found[`${isSplit ? "two pictures" : "one"}, panel ${isPanelOpen ? "open" : "closed"}`] = all;
         await user.ask("app.facts.set({ notice: undefined })");
       }
+    }
+    expect(found).toEqual({});
+  },
+);
+
+it.each(sizes)(
+  "a long notice with a long name has its words within it, and leaves the picture room, at %d x %d",
+  async (width, height) => {
+    await user.page.setViewportSize({ width, height });
+    const found: Record<string, string[]> = {};
+    for (const isPanelOpen of [false, true]) {
+      await user.ask(`app.view.set({ isSplit: false, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
+      await drawn(user);
+      const room = async () => (await user.page.locator("canvas.stage").boundingBox())!.height;
+      const before = await room();
+      await user.page.evaluate(([notice]) => (window as any).__lpdeform.app.facts.set({ notice }), [longNotice]);
+      await drawn(user);
+      const all = await user.page.evaluate(faults, [parts, isLittle(width, height) ? beside : []]);
+      if ((await room()) < 0.55 * before) all.push(`the picture is ${await room()} px high, without a notice ${before}`);
+      if (all.length > 0) found[`panel ${isPanelOpen ? "open" : "closed"}`] = all;
+      await user.ask("app.facts.set({ notice: undefined })");
     }
     expect(found).toEqual({});
   },
