@@ -84,7 +84,7 @@ it("a GLB with lines and points is opened, and the page says which stay as they 
   expect(await user.page.locator(".panel .still li").allTextContents()).toEqual(stay.slice(0, 1));
   document.json["extensionsRequired"] = ["KHR_draco_mesh_compression"];
   await user.openFiles({ name: "tube.glb", content: Buffer.from(writeGlb(document)) });
-  const refused = "The extension KHR_draco_mesh_compression is required by the file and not known here.";
+  const refused = "The extension “KHR_draco_mesh_compression” is required by the file and not known here.";
   await user.page.locator(".notice", { hasText: refused }).waitFor();
   expect(user.errors).toEqual([]);
 });
@@ -95,7 +95,7 @@ it("the command line and the page refuse the same compressions that no primitive
     document.json["extensionsRequired"] = [name];
     const bytes = writeGlb(document);
     await writeFile(join(folder, "tube.glb"), bytes);
-    const words = `he extension ${name} is required by the file and not known here`;
+    const words = new RegExp(`he extension ["“]${name}["”] is required by the file and not known here`);
     expect(() => parseMesh("tube.glb", bytes)).toThrow(words);
     await expect(promisify(execFile)(program, ["info", join(folder, "tube.glb")])).rejects.toThrow(words);
   }
