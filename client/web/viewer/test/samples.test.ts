@@ -38,7 +38,7 @@ it("most samples are opened, of each format, and the others refused by a sentenc
 });
 
 it.each([
-  ["glTF2/BoxTextured-glTF-techniqueWebGL/BoxTextured.gltf", "The extension KHR_technique_webgl is required by the file"],
+  ["glTF2/BoxTextured-glTF-techniqueWebGL/BoxTextured.gltf", "The extension “KHR_technique_webgl” is required by the file"],
   ["glTF2/draco/2CylinderEngine.gltf", "Primitive 0 of mesh 23 (“body”) is compressed by KHR_draco_mesh_compression"],
   ["glTF2/IndexOutOfRange/IndexOutOfRange.gltf", "Primitive 0 of mesh 0 (“Mesh”) names by index 0 vertex 255 of 24"],
   ["glTF2/MissingBin/BoxTextured.gltf", "Buffer 0 of BoxTextured.gltf is not in the file; open it together"],
