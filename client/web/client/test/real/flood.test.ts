@@ -61,7 +61,8 @@ test.each([1, 2, 8])(
     expect(after.slice(first).every(isFresh)).toBe(true);
     const frameBytes = after[first]!.wireBytes;
     const held = after[first]!.receivedBytes - lines[resumed]!.receivedBytes - frameBytes;
-    expect(held).toBeLessThanOrEqual(credit * (frameBytes + 1024) + 1024);
+    const nextOne = 64 * 1024; // a chunk of the frame after the newest may have come with it
+    expect(held).toBeLessThanOrEqual(credit * (frameBytes + 1024) + nextOne);
     console.log(
       `credit ${credit}: ${first} older frames, ${(held / 1024).toFixed(0)} KiB held on the way, ` +
         `the newest ${after[first]!.at - resumedAt} ms after the pause, ` +
