@@ -237,8 +237,8 @@ const Points& Deformer::positions() const {
 
 std::vector<Eigen::Matrix3d> Deformer::rotations() {
   Impl& self = *impl_;
-  if (self.minimiser || self.search ||
-      self.certificate) {  // a look at a running solve, whose evaluation stays
+  if (self.minimiser || self.search || self.certificate) {
+    // The running solve needs the objective's evaluation as it is.
     CellPass cells(self.shape, self.workers());
     cells.evaluate(self.x, self.even_norm());
     return cells.rotations();

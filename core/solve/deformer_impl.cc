@@ -329,10 +329,10 @@ void Deformer::Impl::iterate() {
   const StepResult result = minimiser->step();
   const bool is_ahead = settings.method == Method::kMultiresolution && result.stage == 0;
   if (!is_ahead) ++fine_iterations;
+  // After many iterations of a first move, x has left the coarse level's shape.
   if (is_ahead)
     lead = Lead::kAhead;
-  else if (settings.method ==
-           Method::kMultiresolution)  // after many iterations x has left the coarse level's shape
+  else if (settings.method == Method::kMultiresolution)
     lead = fine_iterations > kMostTogether ? Lead::kNone : Lead::kTogether;
   double sum = result.true_sum ? *result.true_sum : objective.sum(*norm);
   keep_if_best(sum);

@@ -49,8 +49,8 @@ TEST_P(LedDragTest, KeepsNearTheMinimum) {
   EXPECT_LE(above_minimum(last), GetParam() == 6 ? 1.6 : 1.2);
 }
 
-/// On a slow machine each move may come before the first iteration of the one before. Without what the coarse level finds for the first
-/// move, it is 2.8, 2.8 and 3.4 times the minimum.
+/// On a slow machine a move may come before the first iteration of the move before. The ratio was 2.8, 2.8 and 3.4 when coarse levels
+/// led only after an iteration.
 TEST_P(LedDragTest, KeepsNearTheMinimumAlsoWithoutAnyIteration) {
   for (int number = 1; number < 12; ++number) (void)move(number, 0);
   EXPECT_LE(above_minimum(move(12, 0)), GetParam() == 6 ? 3 : 1.4);
@@ -76,7 +76,7 @@ INSTANTIATE_TEST_SUITE_P(Norms, LedDragTest, testing::Values(1.5, 2.0, 6.0));
 
 class LedDragOfLowPTest : public LedDragTest {};
 
-/// With coarse levels that start anew after a dozen fine iterations, it is 1.33 and 1.20 times.
+/// The ratio was 1.33 and 1.20 when a coarse level did not lead the move after one of a dozen fine iterations.
 TEST_P(LedDragOfLowPTest, BeginsNearTheMinimumWhereMovesHaveTime) {
   for (int number = 1; number < 10; ++number) (void)move(number, 20);
   double most = 0;

@@ -46,7 +46,7 @@ beforeEach(() => {
   stroke.move(at(7));
 });
 
-it("places that wait are painted at once for whoever saves the work, and the stroke goes on", () => {
+it("saving paints the places that wait at once, and the stroke goes on", () => {
   expect(painted()).toEqual([]);
   stroke.flush();
   expect(painted()).toEqual([0, 7]);

@@ -382,7 +382,7 @@ export class App implements Workbench {
     return this.cancelGesture() || [...held, ...others].includes(true);
   }
 
-  /** What the pointer has done so far is in the document, for whoever saves it. */
+  /** Writes what the pointer has done so far into the document. Call it before the document is saved. */
   flush(): void {
     for (const editing of this.#editings) editing.flush();
   }

@@ -74,7 +74,7 @@ export class Blend {
     document.addEventListener("visibilitychange", () => this.#soon());
   }
 
-  /** The slider is pressed anew. */
+  /** Call it when the slider is pressed. */
   begin(): void {
     this.#isCancelled = false;
   }
