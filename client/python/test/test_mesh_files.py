@@ -243,11 +243,11 @@ def damaged(change: Callable[[Document], object]) -> bytes:
         (damaged(lambda d: d["bufferViews"][0].update(byteOffset=1 << 60)), "MESH_SYNTAX", "bufferView 0"),
         (damaged(lambda d: d["meshes"][0]["primitives"][0]["attributes"].update(POSITION=99)), "MESH_SYNTAX", "primitive 0 of mesh 0"),
         (damaged(lambda d: d["nodes"][0].update(children=[0])), "MESH_SYNTAX", "the nodes"),
-        (damaged(lambda d: d.update(extensionsRequired=["ACME_secret"])), "MESH_UNSUPPORTED", "the extension ACME_secret"),
+        (damaged(lambda d: d.update(extensionsRequired=["ACME_secret"])), "MESH_UNSUPPORTED", 'the extension "ACME_secret"'),
         (
             damaged(lambda d: d.update(extensionsRequired=["KHR_draco_mesh_compression"])),
             "MESH_UNSUPPORTED",
-            "the extension KHR_draco_mesh_compression",
+            'the extension "KHR_draco_mesh_compression"',
         ),
         (
             damaged(lambda d: d["bufferViews"][0].update(extensions={"EXT_meshopt_compression": {}})),
