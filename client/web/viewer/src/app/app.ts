@@ -392,8 +392,9 @@ export class App implements Workbench {
     for (const editing of this.#editings) editing.release();
   }
 
-  /** A handle that comes back is selected again if it was when it went. */
+  /** What the pointer has done so far is the first step to go. A handle that comes back is selected again if it was when it went. */
   undo(): void {
+    this.endAll();
     const { handles } = this.document;
     if (!this.history.undo()) return;
     this.#documentChanged(performance.now());
@@ -406,6 +407,7 @@ export class App implements Workbench {
   }
 
   redo(): void {
+    this.endAll();
     if (this.history.redo()) this.#documentChanged(performance.now());
   }
 

@@ -93,6 +93,31 @@ it("a handle that is dragged by its vertices goes back, and stays selected", asy
   await pull(await user.vertexOnPage(vertex!), escape);
 });
 
+it.each(["t", "r"])("undo takes back a drag that goes on, and ends it (%s)", async (mode) => {
+  const undo = () => user.page.keyboard.press("Control+z");
+  await user.page.keyboard.press(mode);
+  const { x, y } = await anchor();
+  await pull(mode === "t" ? { x, y: y - 55 } : { x: x + 3, y: y - 6 }, undo);
+  const [vertex] = await user.ask<number[]>("document().handles[1].vertices");
+  await pull(await user.vertexOnPage(vertex!), undo);
+});
+
+it("undo takes back a stroke of the p brush that goes on, and ends it", async () => {
+  const { keyboard, mouse } = user.page;
+  await keyboard.press("e");
+  const { x, y } = await user.vertexOnPage(await user.vertexNear([0.5, 0, 2.5]));
+  await mouse.move(x, y);
+  await mouse.down();
+  await mouse.move(x + 2, y + 30, { steps: 3 });
+  expect(await work()).not.toBe(before);
+  await keyboard.press("Control+z");
+  await mouse.move(x + 4, y + 50, { steps: 3 });
+  await mouse.up();
+  expect(await work()).toBe(before);
+  await keyboard.press("Control+Shift+z");
+  expect(await work()).not.toBe(before);
+});
+
 describe("in the second of two pictures", () => {
   beforeEach(split);
 

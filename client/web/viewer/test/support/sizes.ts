@@ -9,6 +9,7 @@ export const sizes: readonly (readonly [number, number])[] = [
   [721, 561],
   [721, 900],
   [740, 360],
+  [768, 920],
   [768, 1024],
   [800, 600],
   [844, 390],
