@@ -31,7 +31,10 @@ export class Service {
   /** Envoy's own page. */
   admin = "";
 
-  /** `files`: what Envoy serves beside; `serverFlags`: of lpdeform-server; `loggedBefore`: what the access log begins with. */
+  /**
+   * `files`: what Envoy serves beside; `serverFlags`: of lpdeform-server; `loggedBefore`: what the access log begins with; `isLow`: the
+   * server computes only when no other process wants to.
+   */
   static async start({
     files = "",
     serverFlags = [] as string[],
@@ -40,10 +43,11 @@ export class Service {
     maxRequests = 4096,
     accessLogBytes = 1 << 26,
     loggedBefore = "",
+    isLow = false,
   } = {}): Promise<Service> {
     const service = new Service();
     if (loggedBefore) writeFileSync(service.accessLog, loggedBefore);
-    await service.startServer(serverFlags);
+    await service.startServer(serverFlags, isLow);
     service.#envoyFlags = [
       "--web",
       "127.0.0.1:0",
@@ -65,8 +69,11 @@ export class Service {
   }
 
   /** On the port that it had before, if it had one. */
-  async startServer(flags: string[] = []): Promise<void> {
-    const child = spawn(serverProgram, ["--address", this.#address, ...flags], { stdio: ["ignore", "pipe", "ignore"] });
+  async startServer(flags: string[] = [], isLow = false): Promise<void> {
+    const program = ["-n", isLow ? "19" : "0", serverProgram];
+    const child = spawn("nice", [...program, "--address", this.#address, ...flags], {
+      stdio: ["ignore", "pipe", "ignore"],
+    });
     this.#server = child;
     for await (const line of createInterface({ input: child.stdout! })) {
       this.#address = line.split(" ").at(-1)!;

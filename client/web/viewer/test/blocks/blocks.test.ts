@@ -1,6 +1,7 @@
 // How long the viewer keeps the page's main thread busy without a break, at 100,000 vertices and more: npm run blocks.
 // SECONDS (default 8) of each drag; FILES: the folder of another build of the page; PROFILE: says what the longest tasks did, "all" with
-// functions, which makes them longer, or "events". Measures, does not judge.
+// functions, which makes them longer, or "events". FAR: the server computes only when the page and the browser do not, as if it was on
+// another machine. Measures, does not judge.
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -25,7 +26,8 @@ const folder = mkdtempSync(join(tmpdir(), "lpdeform-blocks-"));
 let service: Service;
 
 beforeAll(async () => {
-  service = await Service.start({ files: process.env["FILES"] ?? join(import.meta.dirname, "../../dist") });
+  const files = process.env["FILES"] ?? join(import.meta.dirname, "../../dist");
+  service = await Service.start({ files, isLow: process.env["FAR"] !== undefined });
 });
 
 afterAll(async () => {

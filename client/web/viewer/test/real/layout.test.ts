@@ -2,7 +2,7 @@ import { join } from "node:path";
 import { afterAll, beforeAll, expect, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
 import { sizes } from "../support/sizes.js";
-import { User } from "./user.js";
+import { undrawn, User } from "./user.js";
 
 // At every size, nothing that is pressed or read covers anything else.
 
@@ -13,9 +13,9 @@ let touching: User;
 
 beforeAll(async () => {
   service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
-  user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
+  user = await User.open(`${service.url}/?shape=bar&detail=coarse`, { args: undrawn });
   await user.settled();
-  touching = await User.open(`${service.url}/?shape=bar&detail=coarse`, { hasTouch: true });
+  touching = await User.open(`${service.url}/?shape=bar&detail=coarse`, { hasTouch: true, args: undrawn });
   await touching.settled();
 });
 
@@ -376,7 +376,7 @@ it("a picture keeps its size while it is pressed, whatever is said meanwhile", a
 });
 
 it("the shape is fitted again when the panel opens after the first drag", async () => {
-  const fresh = await User.open(`${service.url}/?shape=creature&detail=coarse`, { width: 820, height: 1180, hasTouch: true });
+  const fresh = await User.open(`${service.url}/?shape=creature&detail=coarse`, { width: 820, height: 1180, hasTouch: true, args: undrawn });
   await fresh.settled();
   const [vertex] = await fresh.ask<number[]>(`document().handles.find(({ name }) => name === "Head").vertices`);
   await fresh.drag(await fresh.vertexOnPage(vertex!), -90, -60);

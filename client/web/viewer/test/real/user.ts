@@ -14,6 +14,9 @@ export const launch = {
   ],
 };
 
+/** For tests that do not look at the pictures: nothing is drawn in them, which takes most of the time. */
+export const undrawn = [...launch.args, "--disable-gl-drawing-for-tests"];
+
 export interface FrameFacts {
   inputSeq: number;
   isFinal: boolean;
