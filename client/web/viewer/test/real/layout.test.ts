@@ -34,7 +34,7 @@ const states = [false, true].flatMap((isSplit) =>
 const beside = [".topbar", ".rail", ".options", ".dock", ".panel", ".hint", ".legend", ".notice"];
 const isTelephone = (width: number, height: number) => (width <= 720 && width <= height) || (height <= 560 && height <= width);
 const isLittle = (width: number, height: number) =>
-  isTelephone(width, height) || (width <= 900 && height <= 900) || (width <= 1000 && height <= 600);
+  isTelephone(width, height) || (width <= 900 && height <= 900) || (width <= 1150 && height <= 600);
 const little = sizes.filter(([width, height]) => isTelephone(width, height));
 const drawn = ({ page }: User) =>
   page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
@@ -196,6 +196,27 @@ it.each(sizes)(
         await drawn(user);
         const all = await user.page.evaluate(covering);
         if (all.length > 0) found[`${shape}, ${isSplit ? "two pictures" : "one"}`] = all;
+      }
+    }
+    expect(found).toEqual({});
+  },
+);
+
+it.each(sizes)(
+  "the options of a tool that is taken cover no shape at %d x %d, as long as nobody has turned the view",
+  async (width, height) => {
+    await user.page.setViewportSize({ width, height });
+    const found: Record<string, string[]> = {};
+    for (const isPanelOpen of [false, true]) {
+      for (const isSplit of [false, true]) {
+        await user.ask(`app.view.set({ isSplit: ${isSplit}, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
+        await user.ask(`app.startOver("creature", "coarse")`);
+        await user.until("window.__lpdeform.app.panes.every(({ stage }) => stage.surface)");
+        await drawn(user);
+        await user.ask(`app.view.set({ tool: "paint" })`);
+        await drawn(user);
+        const all = (await user.page.evaluate(covering)).filter((fault) => !fault.includes("is small"));
+        if (all.length > 0) found[`${isSplit ? "two pictures" : "one"}, panel ${isPanelOpen ? "open" : "closed"}`] = all;
       }
     }
     expect(found).toEqual({});
