@@ -270,12 +270,12 @@ it.each(sizes)(
   },
 );
 
-/** What of this part of the page cannot be scrolled into sight and pressed there, by name. */
+/** What of this part of the page cannot be pressed, if need be after it is scrolled into sight, by name. */
 function outOfReach(part: string): string[] {
   return [...document.querySelector(part)!.querySelectorAll<HTMLElement>("button, select, input")].flatMap((control) => {
     const pressed = control.closest<HTMLElement>("label") ?? control;
     if (!pressed.checkVisibility()) return [];
-    pressed.scrollIntoView({ block: "center", inline: "center" });
+    if (part !== ".dock") pressed.scrollIntoView({ block: "center", inline: "center" });
     const { left, right, top, bottom } = pressed.getBoundingClientRect();
     const found = [left + 2, (left + right) / 2, right - 2].map((x) => document.elementFromPoint(x, (top + bottom) / 2));
     return found.every((element) => pressed.contains(element)) ? [] : [control.ariaLabel ?? control.textContent];
@@ -300,6 +300,20 @@ it.each(sizes)("every option of every tool, the menu and the panel are reached a
   expect(await one.page.evaluate(outOfReach, ".panel")).toEqual([]);
 });
 
+const cases = [...sizes.map((size) => [...size, "a mouse"] as const), ...little.map((size) => [...size, "fingers"] as const)];
+
+it.each(cases)("what the dock has is pressed where it is seen at %d x %d under %s", async (width, height, pointer) => {
+  const one = pointer === "fingers" ? touching : user;
+  await one.page.setViewportSize({ width, height });
+  for (const isSplit of [false, true]) {
+    for (const isPanelOpen of [false, true]) {
+      await one.ask(`app.view.set({ isSplit: ${isSplit}, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
+      await drawn(one);
+      expect(await one.page.evaluate(outOfReach, ".dock")).toEqual([]);
+    }
+  }
+});
+
 it.each(little)("the picture has more than half of a telephone of %d x %d, with the options open", async (width, height) => {
   for (const one of [user, touching]) {
     await one.page.setViewportSize({ width, height });
@@ -311,8 +325,6 @@ it.each(little)("the picture has more than half of a telephone of %d x %d, with 
     }
   }
 });
-
-const cases = [...sizes.map((size) => [...size, "a mouse"] as const), ...little.map((size) => [...size, "fingers"] as const)];
 
 it.each(cases)("nothing covers anything at %d x %d under %s", async (width, height, pointer) => {
   const one = pointer === "fingers" ? touching : user;
