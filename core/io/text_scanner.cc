@@ -13,10 +13,6 @@
 namespace lpdeform {
 namespace {
 
-bool is_blank(char c) {
-  return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
-}
-
 std::string_view without_plus(std::string_view word) {
   if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
   return word;
@@ -32,16 +28,22 @@ double beyond_double(std::string_view word) {
 }  // namespace
 
 TextScanner::TextScanner(std::string_view text, LineEnds line_ends)
-    : text_(text), is_continued_(line_ends == LineEnds::kContinued) {
+    : text_(text),
+      is_continued_(line_ends == LineEnds::kContinued),
+      line_end_(text.find('\n') == std::string_view::npos ? '\r' : '\n') {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.starts_with(kByteOrderMark)) at_ = kByteOrderMark.size();
+}
+
+bool TextScanner::is_blank(char c) const {
+  return c == ' ' || c == '\t' || (c == '\r' && line_end_ != '\r') || c == '\v' || c == '\f';
 }
 
 /// The length of the line continuation (a backslash and the line end) at `at`; 0 if there is none.
 std::size_t TextScanner::continuation_at(std::size_t at) const {
   if (!is_continued_ || text_[at] != '\\') return 0;
   const std::string_view rest = text_.substr(at + 1);
-  if (rest.starts_with('\n')) return 2;
+  if (rest.starts_with(line_end_)) return 2;
   return rest.starts_with("\r\n") ? 3 : 0;
 }
 
@@ -50,7 +52,7 @@ void TextScanner::skip_blanks() {
     if (is_blank(text_[at_])) {
       ++at_;
     } else if (text_[at_] == '#') {
-      at_ = std::min(text_.find('\n', at_), text_.size());
+      at_ = std::min(text_.find(line_end_, at_), text_.size());
     } else if (const std::size_t joint = continuation_at(at_); joint > 0) {
       at_ += joint;
     } else {
@@ -62,7 +64,7 @@ void TextScanner::skip_blanks() {
 std::string_view TextScanner::next_on_line() {
   skip_blanks();
   const std::size_t begin = at_;
-  while (at_ < text_.size() && text_[at_] != '\n' && !is_blank(text_[at_]) && continuation_at(at_) == 0)
+  while (at_ < text_.size() && text_[at_] != line_end_ && !is_blank(text_[at_]) && continuation_at(at_) == 0)
     ++at_;
   if (at_ > begin) last_word_ = begin;
   return text_.substr(begin, at_ - begin);
@@ -75,13 +77,13 @@ std::string_view TextScanner::next() {
 }
 
 bool TextScanner::skip_line() {
-  while (at_ < text_.size() && text_[at_] != '\n') at_ += std::max<std::size_t>(1, continuation_at(at_));
+  while (at_ < text_.size() && text_[at_] != line_end_) at_ += std::max<std::size_t>(1, continuation_at(at_));
   if (at_ < text_.size()) ++at_;
   return at_ < text_.size();
 }
 
 std::int64_t TextScanner::line() const {
-  return 1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(last_word_), '\n');
+  return 1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(last_word_), line_end_);
 }
 
 absl::Status TextScanner::error(std::string_view what) const {

@@ -9,7 +9,8 @@
 
 namespace lpdeform {
 
-/// Reads a text word by word. Blanks separate words; '#' starts a comment that ends with the line.
+/// Reads a text word by word. Blanks separate words; '#' starts a comment that ends with the line. Lines end in "\n" or
+/// "\r\n"; or in "\r", if the text has no "\n".
 class TextScanner {
  public:
   enum class LineEnds {
@@ -39,12 +40,14 @@ class TextScanner {
 
  private:
   void skip_blanks();
+  bool is_blank(char c) const;
   std::size_t continuation_at(std::size_t at) const;
 
   std::string_view text_;
   std::size_t at_ = 0;
   std::size_t last_word_ = 0;
   bool is_continued_;
+  char line_end_;
 };
 
 /// A decimal number, also "nan", "inf" and with a leading '+'. A number that is too large becomes infinite. Empty if

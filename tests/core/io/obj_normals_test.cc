@@ -83,6 +83,7 @@ TEST(ObjNormals, HaveTheLineEndsOfTheSource) {
   for (const std::string& end : {std::string("\n"), std::string("\r\n"), std::string("\r")}) {
     const std::string source = absl::StrReplaceAll(std::string(kCorner), {{"\n", end}});
     const MeshFile file = obj(source);
+    ASSERT_GT(file.mesh.faces.rows(), 0);
     const std::string text = obj_text_with_normals(file, 2 * file.mesh.vertices, std::nullopt);
     EXPECT_THAT(absl::StrReplaceAll(text, {{end, ""}}), Not(AnyOf(HasSubstr("\n"), HasSubstr("\r"))));
     EXPECT_THAT(text, HasSubstr(absl::StrCat(end, "vn ")));

@@ -69,6 +69,16 @@ TEST(Obj, JoinsLinesThatEndInABackslash) {
   EXPECT_TRUE(same_faces(mesh.faces, kFan));
 }
 
+TEST(Obj, LinesMayEndInCarriageReturnsAlone) {
+  const std::string text = "# a\rv 0 0 0\rv 1 0 0 # b\rv 1 1 \\\r 0\rv 0 1 0\rf 1 2 3 4\r";
+  const absl::StatusOr<MeshFile> file = parse_mesh(text, MeshFormat::kObj);
+  ASSERT_TRUE(file.ok());
+  EXPECT_TRUE(same_faces(file->mesh.faces, kFan));
+  EXPECT_EQ(obj_text(*file, 2 * file->mesh.vertices),
+            "# a\rv 0 0 0\rv 2 0 0 # b\rv 2 2 0\rv 0 2 0\rf 1 2 3 4\r");
+  EXPECT_EQ(words_of("v 0 0 0\r\rv 1 0\r"), "Line 3: a v line needs three numbers.");
+}
+
 TEST(Obj, SkipsCommentsAndEverythingElse) {
   EXPECT_TRUE(
       same_faces(faces_of(square_with("# f 1 2 3\ng a b\no thing\ns off\nusemtl red\nmtllib x.mtl\nl 1 2\n"

@@ -1,6 +1,7 @@
 import { loadDecompressor } from "./decode.js";
 import { LpdeformError, sessionClosed } from "./errors.js";
 import { checkVertexCount, type Copy, createSession, joinSession, type Lease, routeOf } from "./lease.js";
+import { checkWord } from "./key_checks.js";
 import {
   checkCallOptions,
   checkJoinOptions,
@@ -118,8 +119,9 @@ export class Session implements AsyncIterable<Frame> {
     return this.#link.ledger.newest;
   }
 
-  /** Calls `listener` at each such event, until the returned function is called. */
+  /** Calls `listener` at each such event, until the returned function is called. Throws for an unknown name (UNKNOWN_KEY). */
   on<Name extends keyof SessionEvents>(name: Name, listener: (event: SessionEvents[Name]) => void): () => void {
+    checkWord(name, this.#listeners, "event");
     const listeners = this.#listeners[name] as Set<typeof listener>;
     listeners.add(listener);
     return () => listeners.delete(listener);

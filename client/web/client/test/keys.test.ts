@@ -109,6 +109,14 @@ describe("a call is refused by the name of the option that is not known, before 
     await expect(restoreWith(rpc, new Uint8Array(1), untyped({ settings: {} }))).rejects.toEqual(refusal("settings"));
   });
 
+  test("an event", async () => {
+    const { session } = await begin();
+    for (const name of ["problems", "toString"]) {
+      const call = () => session.on(untyped<"problem">(name), () => undefined);
+      expect(call).toThrow(`Event is "${name}", which is not known; known are problem, connection, notice.`);
+    }
+  });
+
   test.each<[string, (session: Session) => Promise<unknown>]>([
     ["timeout", (session) => session.settle(untyped({ timeout: 5 }))],
     ["timeoutMs", (session) => session.solve(untyped({ timeoutMs: 5 }))],

@@ -79,7 +79,7 @@ test("what nobody should have thrown in the worker is an LpdeformError, too, and
   await expect(broken).rejects.toMatchObject({ name: "LpdeformError", code: "internal", reason: "EXCEPTION" });
   const long = new File(["v 1 2\n", "#".repeat(300_000)], "wrong.obj");
   await expect(readMesh(long)).rejects.toThrow(
-    new FileFault("wrong.obj, line 1: a vertex has no three finite coordinates."),
+    new FileFault("wrong.obj, line 1, vertex 1: a vertex has no three finite coordinates."),
   );
 });
 

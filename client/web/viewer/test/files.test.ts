@@ -78,9 +78,9 @@ describe("meshes", () => {
     ["a.txt", "", "not a mesh that can be read"],
     ["a.ply", ply("element vertex 1e15", "element face 1"), "Element “vertex” of a.ply has no property"],
     ["a.ply", ply("element odd 1000000000000000", "element vertex 1"), "Element “odd” of a.ply has no property"],
-    ["a.ply", ply("element vertex -1", "property float x"), "Element “vertex” of a.ply has the count “-1”"],
-    ["a.ply", ply("element vertex 1.5", "property float x"), "Element “vertex” of a.ply has the count “1.5”"],
-    ["a.ply", ply("element vertex many", "property float x"), "Element “vertex” of a.ply has the count “many”"],
+    ["a.ply", ply("element vertex -1", "property float x"), "a.ply, line 3: the element “vertex” has the count “-1”"],
+    ["a.ply", ply("element vertex 1.5", "property float x"), "a.ply, line 3: the element “vertex” has the count “1.5”"],
+    ["a.ply", ply("element vertex many", "property float x"), "a.ply, line 3: the element “vertex” has the count “many”"],
     [
       "a.ply",
       ply("element face 1", "property list double int vertex_indices", "end_header", "1e20 0"),
@@ -124,7 +124,18 @@ describe("meshes", () => {
       "a.off, line 6, face 0: it says that it has 4 corners, and names 3",
     ],
     ["a.obj", "v 0 0 0\nf 1 1 1.5\n", "a.obj, line 2: face 1 has the corner “1.5”; there are 1 vertices"],
-    ["a.obj", "v 0 0 0\nf 1 1\n", "line 2: a face has 2 corners"],
+    ["a.obj", "v 0 0 0\nf 1 1\n", "a.obj, line 2, face 1: a face has 2 corners"],
+    ["a.obj", "v 0 0 0\n\nv 1 0\n", "a.obj, line 3, vertex 2: a vertex has no three finite coordinates"],
+    [
+      "a.ply",
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n3 0 0 0\n\n3 0 0 7\n",
+      "a.ply, line 13: face 1 has vertex 7; there are 1",
+    ],
+    [
+      "a.ply",
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty flot x\nend_header\n",
+      "a.ply, line 4: a property has the type flot",
+    ],
     ["a.obj", "v 0 0 0\n", "has no faces"],
     ["a.obj", "", "has no vertices"],
     [

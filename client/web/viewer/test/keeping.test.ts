@@ -44,7 +44,9 @@ const turned = (positions: readonly number[]) =>
     const [x, y, z] = positions.slice(k - (k % 3), k - (k % 3) + 3) as [number, number, number];
     return [x + 5, 0 - z, y][k % 3]!;
   });
-const lines = (text: string, key: string) => text.split("\n").filter((line) => line.startsWith(`${key} `));
+/** Without comments. */
+const lines = (text: string, key: string) =>
+  text.split("\n").flatMap((line) => (line.startsWith(`${key} `) ? [line.split(" #")[0]!] : []));
 
 describe("an OBJ file that is saved again", () => {
   it("keeps texture coordinates, groups, materials, polygons, colours and the rest, line by line", () => {
@@ -52,7 +54,8 @@ describe("an OBJ file that is saved again", () => {
     const kept = (text: string) => text.split("\n").filter((line) => !/^(v|vn|f) |^ /.test(line));
     expect(kept(written)).toEqual(kept(file));
     expect(lines(written, "v")[0]).toBe("v 5 0 0 0.1 0.2 0.3");
-    expect(lines(written, "v")[5]).toBe("v 6 -1 0 0 0 0");
+    expect(written).toContain("\nv 6 -1 \\\n 0 0 0 0\nv 5.5 -1.5 -0.1 1 1 0 # the tip\n");
+    expect(written).toMatch(/^f -7.* # a pentagon$/m);
     const words = lines(written, "f").map((line) => line.split(" ").slice(1));
     expect(words.map((face) => face.map((word) => word.split("/").slice(0, 2).join("/")))).toEqual([
       ["1/1", "4/4", "3/3", "2/2"],
@@ -112,6 +115,14 @@ describe("an OBJ file that is saved again", () => {
     const obj = Uint8Array.from(parts.flatMap((part) => [...part]));
     const mesh = parseMesh("a.obj", obj) as ReturnType<typeof read>;
     expect(rewriteObj(mesh, mesh.positions)).toEqual(obj);
+  });
+
+  it("may have faces that name normals after them, which then come before them", () => {
+    const late = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1//2 2//2\t3//1\nvn 1 0 0\nvn 0 0 1\nf 3//-1  2//-1 1//-2\n";
+    const mesh = parseMesh("a.obj", bytes(late)) as ReturnType<typeof read>;
+    const normals = ["vn 0 0 1", "vn 0 0 1", "vn 1 0 0", "vn 0 0 1", "vn 1 0 0"];
+    const [before, after] = ["v 0 0 0\nv 1 0 0\nv 0 1 0", "f 1//1 2//2\t3//3\nf 3//4  2//2 1//5\n"];
+    expect(text(rewriteObj(mesh, mesh.positions))).toBe([before, ...normals, after].join("\n"));
   });
 
   it("keeps a normal where the surface has no direction", () => {

@@ -47,7 +47,7 @@ it.each([
   ["glTF/TwoBoxes/TwoBoxes.gltf", "TwoBoxes.gltf is no glTF of version 2"],
   ["invalid/malformed.obj", "malformed.obj, line 23: face 1 has the corner “12”; there are 8 vertices"],
   ["OBJ/box_UTF16BE.obj", "box_UTF16BE.obj is in UTF-16"],
-  ["OBJ/number_formats.obj", "number_formats.obj, line 11: a vertex has no three finite coordinates"],
+  ["OBJ/number_formats.obj", "number_formats.obj, line 11, vertex 8: a vertex has no three finite coordinates"],
   ["PLY/points.ply", "points.ply has no faces: a cloud of points cannot be deformed"],
 ])("%s is refused: %s", (path, words) => {
   expect(all.find((sample) => sample.path === path)?.mesh).toContain(words);

@@ -22,15 +22,17 @@ const beside: Readonly<Record<string, string>> = {
 export function readObj(name: string, text: string): Mesh {
   const builder = new MeshBuilder();
   let [least, most, areWhole] = [0, 0, true];
+  let face = 0;
   for (const { words, number } of logicalLines(text)) {
     const [key, ...values] = words;
     if (key === "v") {
       const [x = NaN, y = NaN, z = NaN] = values.map(Number);
-      builder.vertex(x, y, z, `${name}, line ${number}`);
+      builder.vertex(x, y, z, () => `${name}, line ${number}, vertex ${builder.vertexCount + 1}`);
       if (values.length > 5) builder.leftAside("colours of vertices");
     } else if (key === "f") {
       const corners = values.map((word) => cornerOf(word, builder.vertexCount));
-      builder.polygon(corners, `${name}, line ${number}`);
+      ++face;
+      builder.polygon(corners, () => `${name}, line ${number}, face ${face}`);
       for (const corner of corners) {
         least = Math.min(least, corner);
         most = Math.max(most, corner);

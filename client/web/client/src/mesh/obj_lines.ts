@@ -9,12 +9,13 @@ export interface ObjLine {
 }
 
 export function* logicalLines(text: string): Generator<ObjLine> {
-  const lines = text.split(text.includes("\n") ? "\n" : "\r");
+  const separator = text.includes("\n") ? "\n" : "\r";
+  const lines = text.split(separator);
   for (let k = 0; k < lines.length; ++k) {
     const begin = k;
     while (/\\\r?$/.test(lines[k]!) && k + 1 < lines.length) ++k;
-    const line = k === begin ? lines[k]! : lines.slice(begin, k + 1).join("\n");
-    const plain = line.replace(/\\\r?\n/g, " ").replace(/(^|\s)#.*/s, "");
+    const line = k === begin ? lines[k]! : lines.slice(begin, k + 1).join(separator);
+    const plain = line.replace(/\\(?:\r?\n|\r)/g, " ").replace(/(^|\s)#.*/s, "");
     const words = plain.split(/\s+/).filter((word) => word !== "");
     yield { text: line, words, number: k + 1 };
   }

@@ -40,16 +40,29 @@ const sizes: Record<string, number> = {
 /** PLY as text, or binary in either byte order. */
 export function readPly(name: string, bytes: Uint8Array): Mesh {
   const { format, elements, length } = readHeader(name, bytes);
-  const reader =
+  const newReader = () =>
     format === "ascii"
       ? textReader(bytes, length)
       : binaryReader(bytes.subarray(length), format === "binary_little_endian");
+  const reader = newReader();
   const builder = new MeshBuilder();
   for (const element of elements) {
     for (const what of besideOf(element)) builder.leftAside(what);
     for (let k = 0; k < element.count; ++k) readRow(name, element, k, reader, builder);
   }
-  return builder.finish(name);
+  return builder.finish(name, (face) => `${name}${placeOfFace(name, elements, face, newReader())}: face ${face}`);
+}
+
+/** Reads up to the face once more. */
+function placeOfFace(name: string, elements: readonly Element[], face: number, reader: Reader): string {
+  const again = new MeshBuilder();
+  for (const element of elements) {
+    for (let k = 0; k < element.count; ++k) {
+      readRow(name, element, k, reader, again);
+      if (element.name === "face" && k === face) return reader.place();
+    }
+  }
+  return "";
 }
 
 function readHeader(name: string, bytes: Uint8Array): { format: string; elements: Element[]; length: number } {
@@ -58,17 +71,19 @@ function readHeader(name: string, bytes: Uint8Array): { format: string; elements
   if (!head.startsWith("ply") || !end) throw new FileFault(`${name} has no PLY header.`);
   let format = "";
   const elements: Element[] = [];
-  for (const line of head.slice(0, end.index).split(/\r?\n/)) {
+  for (const [k, line] of head.slice(0, end.index).split(/\r?\n/).entries()) {
+    const where = `${name}, line ${k + 1}`;
     const [key, ...words] = line.trim().split(/\s+/);
     if (key === "format") format = words[0] ?? "";
-    if (key === "element") elements.push({ name: words[0] ?? "", count: countOf(name, words), properties: [] });
+    if (key === "element") elements.push({ name: words[0] ?? "", count: countOf(where, words), properties: [] });
     if (key === "property") {
       const property: Property =
         words[0] === "list"
           ? { name: words[3] ?? "", type: words[2] ?? "", lengthType: words[1] ?? "" }
           : { name: words[1] ?? "", type: words[0] ?? "" };
       for (const type of [property.type, property.lengthType ?? property.type]) {
-        if (!(type in sizes)) throw new FileFault(`${name} has a property of type ${type}, which PLY does not know.`);
+        if (!(type in sizes))
+          throw new FileFault(`${where}: a property has the type ${type}, which PLY does not know.`);
       }
       elements.at(-1)?.properties.push(property);
     }
@@ -101,9 +116,9 @@ function besideOf({ name, count, properties }: Element): string[] {
   return others.map((property) => beside.find(([key]) => key.test(property))?.[1] ?? `“${property}”`);
 }
 
-function countOf(name: string, [element, count]: readonly string[]): number {
+function countOf(where: string, [element, count]: readonly string[]): number {
   if (Number.isInteger(Number(count)) && Number(count) >= 0) return Number(count);
-  throw new FileFault(`Element “${element}” of ${name} has the count “${count}”.`);
+  throw new FileFault(`${where}: the element “${element}” has the count “${count}”.`);
 }
 
 function readRow(name: string, element: Element, row: number, reader: Reader, builder: MeshBuilder): void {

@@ -624,6 +624,7 @@ export class App implements Workbench {
       this.#documentChanged(performance.now());
       this.#needsMarks = true;
     }
+    if (view.tool !== before.tool) queueMicrotask(() => this.#panes.needsFit && this.fit()); // when its options are there
     if (view.encoding !== before.encoding && this.mesh !== noMesh)
       for (const pane of this.panes) pane.open(this.mesh, this.document, view, this.#watched);
     if (view.isYUp !== before.isYUp) this.#fitSoon();

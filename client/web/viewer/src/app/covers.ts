@@ -1,4 +1,4 @@
-import type { Box } from "../model/free_room.js";
+import { type Box, overlap } from "../model/free_room.js";
 
 const controls = ".rail, .options, .legend, .dock, .split ~ .dock > *";
 /**
@@ -9,7 +9,7 @@ const said = ", .notice, .aside, .restored, .banner";
 /** Where small.css puts the controls beside the pictures. */
 const littleRoom = matchMedia(
   "(max-width: 720px), (min-aspect-ratio: 1/1) and (max-height: 560px), " +
-    "(max-width: 900px) and (max-height: 900px), (max-width: 1000px) and (max-height: 600px)",
+    "(max-width: 900px) and (max-height: 900px), (max-width: 1150px) and (max-height: 600px)",
 );
 const margin = 8;
 /** The arrow of a handle at the top of the surface. */
@@ -34,4 +34,14 @@ export function coversOf(picture: HTMLElement): Box[] {
         bottom: box.bottom - top + margin,
       })),
   ];
+}
+
+/** Whether the options of the tool lie over this part of a picture. */
+export function areOptionsOver(picture: HTMLElement, part: Box): boolean {
+  const { left, top } = picture.getBoundingClientRect();
+  return [...document.querySelectorAll(".options")]
+    .map((options) => options.getBoundingClientRect())
+    .some((box) =>
+      overlap(part, { left: box.left - left, top: box.top - top, right: box.right - left, bottom: box.bottom - top }),
+    );
 }

@@ -10,17 +10,18 @@ import type { Workbench } from "./workbench.js";
 
 /** Keeps the drag of a handle to what the user has chosen. */
 export class DragSnap {
-  /** Where a drag may go: each vertex that other handles hold, and otherwise the vertices of the mesh at rest. */
+  /** Where a drag may go: each vertex that handles hold which stay, and otherwise the vertices of the mesh at rest. */
   #places: Float32Array | undefined;
 
   /** What goes to a vertex: the handle's vertex that is nearest to where it was taken. */
   readonly #held: Vector3;
 
-  /** `grip`: the place that was taken. */
+  /** `grip`: the place that was taken. `moving`: all handles that the drag moves. */
   constructor(
     readonly work: Workbench,
     readonly pane: Pane,
     readonly handle: Handle,
+    readonly moving: readonly Handle[],
     grip: Vector3,
   ) {
     const { positions } = pane.stage.surface!;
@@ -53,9 +54,9 @@ export class DragSnap {
     return subtract(place, this.#held);
   }
 
-  /** Without those of the handle itself, and those that face away; the view stays during a drag. */
+  /** Without those of the handles that move, and those that face away; the view stays during a drag. */
   #findPlaces(): Float32Array {
-    const { work, pane, handle } = this;
+    const { work, pane, moving } = this;
     const { stage } = pane;
     const places = Float32Array.from(work.mesh.positions);
     for (const { vertices } of work.document.handles) {
@@ -64,7 +65,7 @@ export class DragSnap {
     const normals = vertexNormals(places, work.mesh.faces);
     const all = Array.from({ length: places.length / 3 }, (_, vertex) => vertex);
     const wanted = new Set(facing(all, places, normals, stage.eye));
-    for (const vertex of handle.vertices) wanted.delete(vertex);
+    for (const { vertices } of moving) for (const vertex of vertices) wanted.delete(vertex);
     return places.map((value, k) => (wanted.has(Math.floor(k / 3)) ? value : NaN));
   }
 }

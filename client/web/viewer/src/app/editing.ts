@@ -5,7 +5,7 @@ import { nothing, ofVertices } from "../model/pointed.js";
 import { follow, placesOf } from "../model/places.js";
 import { add, type Pose, subtract } from "../model/pose.js";
 import { boxPolygon, dab, facing, insidePolygon, project } from "../model/selection.js";
-import { posedTogether, selecting, selectionOf, shiftedTogether, toggled } from "../model/together.js";
+import { movableOf, posedTogether, selecting, selectionOf, shiftedTogether, toggled } from "../model/together.js";
 import { vertexNormals } from "lpdeform-client/mesh/normals";
 import { onPlane, type PointerAt, Pointing, type PointingTarget, type Stroke, viewProjection } from "../stage/pointing.js";
 import { KeyPointer } from "./key_pointer.js";
@@ -204,7 +204,7 @@ export class Editing implements PointingTarget {
     const from = onPlane(pane.stage, start.ray, grip) ?? grip;
     const all = selectionOf(work.document, work.view.now);
     const show = (delta: Vector3, time: number) => work.during(shiftedTogether(work.document, all, delta), time);
-    const snap = new DragSnap(work, pane, handle, grip);
+    const snap = new DragSnap(work, pane, handle, movableOf(all), grip);
     return {
       move: (at) => {
         const to = onPlane(pane.stage, at.ray, grip);

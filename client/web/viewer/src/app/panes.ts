@@ -1,9 +1,13 @@
+import { boundsOf } from "lpdeform-client/mesh/mesh";
 import type { Document } from "../model/document.js";
+import type { Box } from "../model/free_room.js";
+import { project } from "../model/selection.js";
 import { capital } from "../model/words.js";
 import type { Status } from "../link/status.js";
+import { viewProjection } from "../stage/pointing.js";
 import type { Look, Stage } from "../stage/stage.js";
 import { Pane, type PaneWatcher } from "./pane.js";
-import { coversOf } from "./covers.js";
+import { areOptionsOver, coversOf } from "./covers.js";
 import { placeOf, watchPlaces } from "./sides.js";
 
 /** What keys do in a picture, for screen readers. */
@@ -93,6 +97,11 @@ export class Panes {
     return this.#fitted !== undefined && isSameLook(this.#fitted, this.all[0]!.stage.look);
   }
 
+  /** Whether the view is as fit() had it, but the options of another tool lie over the surface. */
+  get needsFit(): boolean {
+    return this.isAsFitted && this.all.some(({ element, stage }) => stage.surface && areOptionsOver(element, shownIn(stage)));
+  }
+
   lookFrom(look: Look): void {
     for (const pane of this.all) pane.stage.lookFrom(look);
   }
@@ -143,4 +152,14 @@ function isSameLook(a: Look, b: Look): boolean {
   const far = Math.hypot(...a.position.map((value, axis) => value - a.target[axis]!));
   const ends = [...a.position, ...a.target];
   return [...b.position, ...b.target].every((value, k) => Math.abs(value - ends[k]!) <= 1e-9 * far);
+}
+
+/** The part of the picture in which the surface is. */
+function shownIn(stage: Stage): Box {
+  const { positions, mesh } = stage.surface!;
+  const { min, max } = boundsOf(positions, mesh.faces);
+  const corners = Float32Array.from({ length: 24 }, (_, k) => ((k >> 3) & (1 << (k % 3)) ? max : min)[k % 3]!);
+  const screen = [...project(corners, viewProjection(stage), stage.width, stage.height)];
+  const [x, y] = [0, 1].map((axis) => screen.filter((_, k) => k % 2 === axis)) as [number[], number[]];
+  return { left: Math.min(...x), top: Math.min(...y), right: Math.max(...x), bottom: Math.max(...y) };
 }

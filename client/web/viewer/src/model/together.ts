@@ -34,10 +34,14 @@ export function selecting({ selected, alsoSelected }: Selection, name: string): 
   return { selected: name, alsoSelected: all.includes(name) ? all.filter((one) => one !== name) : [] };
 }
 
-/** Moves handles by this much from where they are here; those that are locked, or free to go anywhere, stay. */
+/** Those of the handles that can be moved: not those that are locked, or free to go anywhere. */
+export function movableOf(handles: readonly Handle[]): Handle[] {
+  return handles.filter(({ isLocked, hold }) => !isLocked && !kindOf(hold).isTurnedOnly);
+}
+
+/** Moves handles by this much from where they are here, if they can be moved. */
 export function shiftedTogether(document: Document, handles: readonly Handle[], by: Vector3): Document {
-  const movable = handles.filter(({ isLocked, hold }) => !isLocked && !kindOf(hold).isTurnedOnly);
-  return movable.reduce((result, handle) => changeHandle(result, handle.name, shifted(handle, by)), document);
+  return movableOf(handles).reduce((result, handle) => changeHandle(result, handle.name, shifted(handle, by)), document);
 }
 
 /**

@@ -1,9 +1,10 @@
 import type { App } from "../app/app.js";
-import { anchorOfHandle, changeHandle, type Document, type Handle, handleOf, shifted } from "../model/document.js";
+import { anchorOfHandle, type Document, type Handle, handleOf } from "../model/document.js";
 import { fromEuler, toEuler } from "../model/euler.js";
 import { kindOf } from "../model/hold_kinds.js";
 import type { Vector3 } from "lpdeform-client/mesh/mesh";
 import { leastScale, mostScale, noScale, scaled, subtract } from "../model/pose.js";
+import { posedTogether, selectionOf, shiftedTogether } from "../model/together.js";
 import { el } from "./dom.js";
 import { type NumberField, numberField } from "./number_field.js";
 
@@ -13,9 +14,10 @@ const stepShare = 0.001;
 /** Beyond this, positions are not drawn. */
 const farthest = 1e18;
 
-/** The pose of the selected handle in numbers. */
+/** The pose of the selected handle in numbers. Handles that are selected together with it follow what is entered, as they follow a drag. */
 export function poseFields(app: App): HTMLElement {
   const selected = () => handleOf(app.document, app.view.now.selected);
+  const selection = () => selectionOf(app.document, app.view.now);
   const row = (
     name: string,
     title: (axis: string) => string,
@@ -46,7 +48,7 @@ export function poseFields(app: App): HTMLElement {
     (handle, axis, value) => {
       const by = [0, 0, 0] as [number, number, number];
       by[axis] = value - movementOf(handle)[axis]!;
-      return changeHandle(app.document, handle.name, shifted(handle, by));
+      return shiftedTogether(app.document, selection(), by);
     },
   );
   const turned = row(
@@ -57,7 +59,7 @@ export function poseFields(app: App): HTMLElement {
     (handle, axis, value) => {
       const angles = [...toEuler(handle.pose.rotation)] as [number, number, number];
       angles[axis] = value;
-      return changeHandle(app.document, handle.name, { pose: { ...handle.pose, rotation: fromEuler(angles) } });
+      return posedTogether(app.document, selection(), { ...handle.pose, rotation: fromEuler(angles) });
     },
   );
   const scaleFields = row(
@@ -68,7 +70,7 @@ export function poseFields(app: App): HTMLElement {
     (handle, axis, value) => {
       const scale = [...(handle.pose.scale ?? noScale)] as [number, number, number];
       scale[axis] = value;
-      return changeHandle(app.document, handle.name, { pose: scaled(handle.pose, scale) });
+      return posedTogether(app.document, selection(), scaled(handle.pose, scale));
     },
   );
   const element = el(

@@ -34,7 +34,7 @@ const states = [false, true].flatMap((isSplit) =>
 const beside = [".topbar", ".rail", ".options", ".dock", ".panel", ".hint", ".legend", ".notice"];
 const isTelephone = (width: number, height: number) => (width <= 720 && width <= height) || (height <= 560 && height <= width);
 const isLittle = (width: number, height: number) =>
-  isTelephone(width, height) || (width <= 900 && height <= 900) || (width <= 1000 && height <= 600);
+  isTelephone(width, height) || (width <= 900 && height <= 900) || (width <= 1150 && height <= 600);
 const little = sizes.filter(([width, height]) => isTelephone(width, height));
 const drawn = ({ page }: User) =>
   page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
@@ -203,6 +203,27 @@ it.each(sizes)(
 );
 
 it.each(sizes)(
+  "the options of a tool that is taken cover no shape at %d x %d, as long as nobody has turned the view",
+  async (width, height) => {
+    await user.page.setViewportSize({ width, height });
+    const found: Record<string, string[]> = {};
+    for (const isPanelOpen of [false, true]) {
+      for (const isSplit of [false, true]) {
+        await user.ask(`app.view.set({ isSplit: ${isSplit}, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
+        await user.ask(`app.startOver("creature", "coarse")`);
+        await user.until("window.__lpdeform.app.panes.every(({ stage }) => stage.surface)");
+        await drawn(user);
+        await user.ask(`app.view.set({ tool: "paint" })`);
+        await drawn(user);
+        const all = (await user.page.evaluate(covering)).filter((fault) => !fault.includes("is small"));
+        if (all.length > 0) found[`${isSplit ? "two pictures" : "one"}, panel ${isPanelOpen ? "open" : "closed"}`] = all;
+      }
+    }
+    expect(found).toEqual({});
+  },
+);
+
+it.each(sizes)(
   "a notice covers neither the shape nor a control at %d x %d, with the panel and without",
   async (width, height) => {
     await user.page.setViewportSize({ width, height });
@@ -249,12 +270,12 @@ it.each(sizes)(
   },
 );
 
-/** What of this part of the page cannot be scrolled into sight and pressed there, by name. */
+/** What of this part of the page cannot be pressed, if need be after it is scrolled into sight, by name. */
 function outOfReach(part: string): string[] {
   return [...document.querySelector(part)!.querySelectorAll<HTMLElement>("button, select, input")].flatMap((control) => {
     const pressed = control.closest<HTMLElement>("label") ?? control;
     if (!pressed.checkVisibility()) return [];
-    pressed.scrollIntoView({ block: "center", inline: "center" });
+    if (part !== ".dock") pressed.scrollIntoView({ block: "center", inline: "center" });
     const { left, right, top, bottom } = pressed.getBoundingClientRect();
     const found = [left + 2, (left + right) / 2, right - 2].map((x) => document.elementFromPoint(x, (top + bottom) / 2));
     return found.every((element) => pressed.contains(element)) ? [] : [control.ariaLabel ?? control.textContent];
@@ -279,6 +300,20 @@ it.each(sizes)("every option of every tool, the menu and the panel are reached a
   expect(await one.page.evaluate(outOfReach, ".panel")).toEqual([]);
 });
 
+const cases = [...sizes.map((size) => [...size, "a mouse"] as const), ...little.map((size) => [...size, "fingers"] as const)];
+
+it.each(cases)("what the dock has is pressed where it is seen at %d x %d under %s", async (width, height, pointer) => {
+  const one = pointer === "fingers" ? touching : user;
+  await one.page.setViewportSize({ width, height });
+  for (const isSplit of [false, true]) {
+    for (const isPanelOpen of [false, true]) {
+      await one.ask(`app.view.set({ isSplit: ${isSplit}, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
+      await drawn(one);
+      expect(await one.page.evaluate(outOfReach, ".dock")).toEqual([]);
+    }
+  }
+});
+
 it.each(little)("the picture has more than half of a telephone of %d x %d, with the options open", async (width, height) => {
   for (const one of [user, touching]) {
     await one.page.setViewportSize({ width, height });
@@ -290,8 +325,6 @@ it.each(little)("the picture has more than half of a telephone of %d x %d, with 
     }
   }
 });
-
-const cases = [...sizes.map((size) => [...size, "a mouse"] as const), ...little.map((size) => [...size, "fingers"] as const)];
 
 it.each(cases)("nothing covers anything at %d x %d under %s", async (width, height, pointer) => {
   const one = pointer === "fingers" ? touching : user;

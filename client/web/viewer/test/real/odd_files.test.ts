@@ -90,9 +90,9 @@ it.each<[Record<string, string | Uint8Array>, string]>([
   ...["obj", "off", "ply", "stl", "glb", "gltf", "fbx", "dae", "3mf", "json", "lpdeform"].map(
     (ending): [Record<string, string>, string] => [{ [`empty.${ending}`]: "" }, `empty.${ending} is empty.`],
   ),
-  [{ "huge.obj": cube.replace("v 1 1 1", "v 1 1e30 1") }, "huge.obj, line 7: a vertex lies farther out than 10000"],
-  [{ "infinite.obj": cube.replace("v 1 1 1", "v 1 1e999 1") }, "infinite.obj, line 7: a vertex has no three finite"],
-  [{ "nan.obj": cube.replace("v 1 1 1", "v 1 nan 1") }, "nan.obj, line 7: a vertex has no three finite coordinates."],
+  [{ "huge.obj": cube.replace("v 1 1 1", "v 1 1e30 1") }, "huge.obj, line 7, vertex 7: a vertex lies farther out than 10000"],
+  [{ "infinite.obj": cube.replace("v 1 1 1", "v 1 1e999 1") }, "infinite.obj, line 7, vertex 7: a vertex has no three finite"],
+  [{ "nan.obj": cube.replace("v 1 1 1", "v 1 nan 1") }, "nan.obj, line 7, vertex 7: a vertex has no three finite coordinates."],
   [{ "cloud.obj": corners }, "cloud.obj has no faces: a cloud of points cannot be deformed."],
   [{ "zero.obj": `${corners}f 0 1 2\n` }, "zero.obj, line 9: face 1 has the corner “0”; there are 8 vertices."],
   [{ "beyond.obj": `${corners}f 1 2 99\n` }, "beyond.obj, line 9: face 1 has the corner “99”; there are 8 vertices."],

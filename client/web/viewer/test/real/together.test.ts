@@ -110,3 +110,49 @@ it("Tab reaches what selects a handle, too, and goes on over its name without le
   await press("Enter"); // the only one that is selected stays so
   expect(await selection()).toBe("Head ");
 });
+
+it("numbers move, turn and scale all that are selected, each entry in one step", async () => {
+  await together("Tail").click();
+  const before = await handles();
+  const enter = async (name: string, text: string) => {
+    const field = user.page.getByRole("textbox", { name, exact: true });
+    await field.fill(text);
+    await field.press("Enter");
+  };
+  await enter("Moved along x", "0.25");
+  const moved = await handles();
+  expect([moved.get("Head")!.translation, moved.get("Tail")!.translation]).toEqual([
+    [0.25, 0, 0],
+    [0.25, 0, 0],
+  ]);
+  await enter("Turned about z", "90");
+  const turned = await handles();
+  expect(turned.get("Tail")!.rotation).toEqual(turned.get("Head")!.rotation);
+  expect(turned.get("Head")!.translation).toEqual([0.25, 0, 0]);
+  expect(turned.get("Tail")!.translation).not.toEqual([0.25, 0, 0]); // about the head's middle
+  await enter("Scaled along x", "1.5");
+  expect(await user.ask("document().handles.map(({ pose }) => pose.scale !== undefined)")).toEqual([false, true, true]);
+  await user.page.locator("canvas.stage").focus();
+  for (let k = 0; k < 3; ++k) await press("Control+z");
+  expect(await handles()).toEqual(before);
+});
+
+it("a drag does not keep to the vertices of handles that move along with it", async () => {
+  await together("Tail").click();
+  await user.page.getByLabel("What a drag keeps to").selectOption("vertices");
+  await user.page.locator("canvas.stage").focus();
+  await press("1");
+  const vertex = await tailVertex();
+  const vertices = await user.page.evaluate<number[]>(
+    `window.__lpdeform.document().handles.flatMap(({ name, vertices }) => (name === "Head" ? vertices : []))`,
+  );
+  const places = await Promise.all(vertices.map((one) => user.vertexOnPage(one)));
+  const from = await user.vertexOnPage(vertex);
+  const to = places[0]!;
+  await user.drag(from, to.x - from.x, to.y - from.y);
+  const rest = await user.ask<Record<string, number>>("app.mesh.positions");
+  const { translation } = (await handles()).get("Tail")!;
+  const goal = [0, 1, 2].map((axis) => rest[3 * vertex + axis]! + translation[axis]!);
+  const far = vertices.map((one) => Math.hypot(...goal.map((value, axis) => value - rest[3 * one + axis]!)));
+  expect(Math.min(...far)).toBeGreaterThan(1e-3); // frames of 16 bits
+});
