@@ -10,11 +10,11 @@ namespace {
 absl::Status read_vertex(TextScanner& scanner, MeshBuilder& builder) {
   const auto x = to_number(scanner.next_on_line()), y = to_number(scanner.next_on_line()),
              z = to_number(scanner.next_on_line());
-  if (!x || !y || !z) return scanner.error("a v line needs three numbers");
-  if (!are_finite(*x, *y, *z)) {
-    return scanner.error(
-        absl::StrCat("vertex ", builder.vertices() + 1, " has a NaN or infinite coordinate"));
-  }
+  const auto error = [&](const char* what) {
+    return scanner.error(absl::StrCat("vertex ", builder.vertices() + 1, what));
+  };
+  if (!x || !y || !z) return error(" needs three numbers");
+  if (!are_finite(*x, *y, *z)) return error(" has a NaN or infinite coordinate");
   builder.add_vertex(*x, *y, *z);
   return absl::OkStatus();
 }
@@ -30,15 +30,18 @@ std::optional<std::int32_t> vertex_number(std::string_view corner) {
   return to_index(corner.substr(0, corner.find('/')));
 }
 
-absl::Status read_face(TextScanner& scanner, std::vector<std::int32_t>& corners, MeshBuilder& builder) {
+/// `face`: its number, from 1 on.
+absl::Status read_face(TextScanner& scanner, std::int64_t face, std::vector<std::int32_t>& corners,
+                       MeshBuilder& builder) {
+  const auto error = [&](const char* what) { return scanner.error(absl::StrCat("face ", face, what)); };
   corners.clear();
   for (std::string_view word = scanner.next_on_line(); !word.empty(); word = scanner.next_on_line()) {
     const auto number = vertex_number(word);
-    if (!number) return scanner.error("a corner of an f line starts with a vertex number");
-    if (*number == 0) return scanner.error("an f line names vertex 0, and the first vertex is 1");
+    if (!number) return error(" has a corner that does not start with a vertex number");
+    if (*number == 0) return error(" names vertex 0, and the first vertex is 1");
     corners.push_back(to_zero_based(*number, builder.vertices()));
   }
-  if (corners.size() < 3) return scanner.error("an f line needs at least three corners");
+  if (corners.size() < 3) return error(" needs at least three corners");
   builder.add_polygon(corners);
   return absl::OkStatus();
 }
@@ -79,11 +82,12 @@ absl::StatusOr<TriangleMesh> parse_obj(std::string_view text) {
   TextScanner scanner(text, TextScanner::LineEnds::kContinued);
   MeshBuilder builder;
   std::vector<std::int32_t> corners;
+  std::int64_t faces = 0;
   do {
     const std::string_view keyword = scanner.next_on_line();
     absl::Status status;
     if (keyword == "v") status = read_vertex(scanner, builder);
-    if (keyword == "f") status = read_face(scanner, corners, builder);
+    if (keyword == "f") status = read_face(scanner, ++faces, corners, builder);
     if (!status.ok()) return status;
   } while (scanner.skip_line());
   TriangleMesh mesh = builder.mesh();

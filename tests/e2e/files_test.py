@@ -373,7 +373,7 @@ class Files(OnShapes):
 
     def test_errors_of_a_mesh_name_its_file_and_what_is_wrong(self):
         corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
-        for text, why in (("f 0 1 2\n", "Line 4: an f line names vertex 0"), ("f 1 2 5\n", 'Line 4: face 1 has the corner "5"; there are 3 vertices.'),
+        for text, why in (("f 0 1 2\n", "Line 4: face 1 names vertex 0"), ("f 1 2 5\n", 'Line 4: face 1 has the corner "5"; there are 3 vertices.'),
                           ("f 1 2 -9\n", 'Line 4: face 1 has the corner "-9"; 3 vertices come before it.'),
                           ("v 0 nan 0\n", "Line 4: vertex 4 has a NaN or infinite coordinate.")):
             mesh = self.write("wrong.obj", corners + text)

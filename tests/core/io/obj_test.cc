@@ -76,7 +76,7 @@ TEST(Obj, LinesMayEndInCarriageReturnsAlone) {
   EXPECT_TRUE(same_faces(file->mesh.faces, kFan));
   EXPECT_EQ(obj_text(*file, 2 * file->mesh.vertices),
             "# a\rv 0 0 0\rv 2 0 0 # b\rv 2 2 0\rv 0 2 0\rf 1 2 3 4\r");
-  EXPECT_EQ(words_of("v 0 0 0\r\rv 1 0\r"), "Line 3: a v line needs three numbers.");
+  EXPECT_EQ(words_of("v 0 0 0\r\rv 1 0\r"), "Line 3: vertex 2 needs three numbers.");
 }
 
 TEST(Obj, SkipsCommentsAndEverythingElse) {
@@ -102,6 +102,18 @@ TEST(Obj, RefusesLinesThatMakeNoSense) {
   EXPECT_EQ(refused(square_with("\nf 1 2 x\n")), "line 6");
   EXPECT_EQ(refused(square_with("f 1 2 /3\n")), "line 5");
   EXPECT_EQ(refused(std::string("v 0 0 0\n\0", 9)), "byte 8");
+}
+
+TEST(Obj, RefusalsNameTheVertexOrFaceAsTheFileCountsThem) {
+  EXPECT_EQ(words_of("v 0 0 0\n\nv 0 zero 0\n"), "Line 3: vertex 2 needs three numbers.");
+  EXPECT_EQ(words_of("v 0 0 0\nv 0 nan 0\n"), "Line 2: vertex 2 has a NaN or infinite coordinate.");
+  const auto second_face = [](const std::string& corners) {
+    return words_of(square_with("f 1 2 3 4\n" + corners));
+  };
+  EXPECT_EQ(second_face("f 1 2\n"), "Line 6: face 2 needs at least three corners.");
+  EXPECT_EQ(second_face("f 1 x 3\n"),
+            "Line 6: face 2 has a corner that does not start with a vertex number.");
+  EXPECT_EQ(second_face("f 1 0 3\n"), "Line 6: face 2 names vertex 0, and the first vertex is 1.");
 }
 
 TEST(Obj, AnEmptyTextIsAnEmptyMesh) {
