@@ -125,6 +125,12 @@ describe("an OBJ file that is saved again", () => {
     expect(text(rewriteObj(mesh, mesh.positions))).toBe([before, ...normals, after].join("\n"));
   });
 
+  it("has no normal at a corner that named one that is not there", () => {
+    const few = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1//1 2//2 3/1/3\n";
+    const mesh = parseMesh("a.obj", bytes(few)) as ReturnType<typeof read>;
+    expect(lines(text(rewriteObj(mesh, mesh.positions)), "f")).toEqual(["f 1//1 2 3/1"]);
+  });
+
   it("keeps a normal where the surface has no direction", () => {
     const flat = parseMesh("a.obj", bytes("v 0 0 0\nv 1 0 0\nv 2 0 0\nvn 0 0 1\nf 1//1 2//1 3//1\n")) as ReturnType<
       typeof read

@@ -1,4 +1,5 @@
 import { FileFault } from "./fault.js";
+import { jsonFaultAt } from "./json_fault.js";
 
 /** A part of a glTF's JSON. */
 export type Part = Record<string, unknown>;
@@ -32,7 +33,7 @@ export function readGltfDocument(
   try {
     json = JSON.parse(new TextDecoder().decode(text)) as Part;
   } catch {
-    throw new FileFault(`${name} is no glTF: its JSON is wrong or breaks off.`);
+    throw new FileFault(`${name} is no glTF: its JSON breaks off or is wrong at byte ${jsonFaultAt(text) + 1}.`);
   }
   const { version } = partOf(json?.["asset"]);
   if (typeof version !== "string" || !version.startsWith("2.")) throw new FileFault(`${name} is no glTF of version 2.`);

@@ -78,6 +78,8 @@ export class App implements Workbench {
   #needsColours = true;
   #needsMarks = true;
   #isToFit = false;
+  /** Poses play: the document is between two of them, and the user has not made it so. */
+  isPlaying = false;
 
   constructor(readonly isWatching = false) {
     this.#panes.add("first");

@@ -20,7 +20,7 @@ export class Player {
     if (keyPoses.length < 2) return this.app.notify("There is nothing to play before there are two poses.", true);
     this.app.endAll();
     this.app.endGesture();
-    this.facts.set({ isPlaying: true });
+    this.#tell(true);
     this.#shown = this.app.document;
     let [seconds, last] = [0, performance.now()];
     const step = (now: number) => {
@@ -56,6 +56,11 @@ export class Player {
 
   #end(): void {
     this.#shown = undefined;
-    this.facts.set({ isPlaying: false });
+    this.#tell(false);
+  }
+
+  #tell(isPlaying: boolean): void {
+    this.app.isPlaying = isPlaying;
+    this.facts.set({ isPlaying });
   }
 }

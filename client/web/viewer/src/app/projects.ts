@@ -3,11 +3,11 @@ import { prepare } from "../io/opened.js";
 import { weldingOf } from "./asides.js";
 import type { App } from "./app.js";
 
-/** The present work as a file. */
+/** The present work as a file. While poses play it is the work from before. */
 export function saveProject(app: App): Promise<Uint8Array<ArrayBuffer>> {
   app.flush();
-  const { mesh, document, view, look } = app;
-  return writeProject({ mesh, document, view: view.now, look });
+  const { mesh, document, view, look, history, isPlaying } = app;
+  return writeProject({ mesh, document: isPlaying ? history.settled : document, view: view.now, look });
 }
 
 /**

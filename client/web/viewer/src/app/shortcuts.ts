@@ -129,7 +129,10 @@ function actions(app: App, files: Files, help: HTMLDialogElement, event: Keyboar
     s: () => view.set({ isSplit: !now.isSplit }),
     t: () => view.set({ gizmo: "translate", tool: "move" }),
     z: () => view.set({ gizmo: "scale", tool: "move" }),
-    x: () => view.set({ axes: after(allAxes, now.axes) }),
+    x: () => {
+      if (now.gizmo === "scale") app.notify("Cubes have the handle’s axes.");
+      else view.set({ axes: after(allAxes, now.axes) });
+    },
     e: () => view.set({ paintMode: now.tool === "paint" ? after(paintModes, now.paintMode) : now.paintMode, tool: "paint" }),
     v: () => view.set({ hasReadout: !now.hasReadout }),
     y: () => app.setSymmetry(after(symmetries, now.symmetry)),

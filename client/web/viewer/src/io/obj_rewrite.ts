@@ -6,7 +6,7 @@ import { type Numbers, NormalTurner } from "./turned_normals.js";
 /**
  * The OBJ file with new positions. Everything stays as it is, comments and blanks too, except the three numbers of vertices, and
  * normals, which turn with the surface; names stay in the encoding that they have. Several vertices may share a normal, so each
- * pair gets a normal of its own, and all of these stand before the first face.
+ * pair gets a normal of its own, and all of these stand before the first face. A corner whose normal is not in the file gets none.
  */
 export function rewriteObj(
   { obj, positions: drawn, exact, faces }: Mesh & { obj: Uint8Array },
@@ -30,7 +30,7 @@ export function rewriteObj(
     if (!normal) return word;
     const at = indexOf(normal, normalCount);
     const from = normals[at];
-    if (!from) return word;
+    if (!from) return texture ? `${vertex}/${texture}` : vertex!; // the file has no such normal, and may have one now
     const corner = cornerOf(vertex!, vertexCount);
     const key = `${corner} ${at}`;
     let number = pairs.get(key);

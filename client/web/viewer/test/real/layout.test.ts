@@ -409,7 +409,12 @@ it("a picture keeps its size while it is pressed, whatever is said meanwhile", a
 });
 
 it("the shape is fitted again when the panel opens after the first drag", async () => {
-  const fresh = await User.open(`${service.url}/?shape=creature&detail=coarse`, { width: 820, height: 1180, hasTouch: true, args: undrawn });
+  const fresh = await User.open(`${service.url}/?shape=creature&detail=coarse`, {
+    width: 820,
+    height: 1180,
+    hasTouch: true,
+    args: undrawn,
+  });
   await fresh.settled();
   const [vertex] = await fresh.ask<number[]>(`document().handles.find(({ name }) => name === "Head").vertices`);
   await fresh.drag(await fresh.vertexOnPage(vertex!), -90, -60);

@@ -1,5 +1,6 @@
 import { beforeEach, expect, it } from "vitest";
 import { bar, withNewUsers } from "./opened.js";
+import { readProject } from "../../src/io/project.js";
 import type { User } from "./user.js";
 
 let user: User;
@@ -48,6 +49,10 @@ it("poses are kept, gone to and played with the solver filling in, as one step; 
 
   await button("Play").click();
   await user.until("window.__lpdeform.document().handles[1].pose.translation[0] !== 0");
+  const saved = await user.downloaded(() => user.page.keyboard.press("Control+s"));
+  const { document } = await readProject("a.lpdeform", new Uint8Array(saved));
+  expect(document.handles[1]!.pose.translation).toEqual([0, 0, 0]);
+  expect(await button("Stop").isVisible()).toBe(true);
   await user.page.keyboard.press("Escape");
   await button("Play").waitFor();
   expect(await moved()).toEqual([0, 0, 0]);

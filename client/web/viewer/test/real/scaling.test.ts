@@ -26,6 +26,10 @@ it("the cubes of the gizmo scale what a handle holds; Escape reverts it, and und
   await user.page.locator("canvas.stage").focus();
   await press("z");
   await user.until("window.__lpdeform.app.panes[0].stage.gizmo.object.children.length > 0");
+  const axes = await user.ask("app.view.now.axes");
+  await press("x");
+  await user.page.locator(".notice", { hasText: "Cubes have the handle’s axes." }).waitFor();
+  expect(await user.ask("app.view.now.axes")).toBe(axes);
   const at = await user.ask<{ x: number; y: number }>("anchorOnPage()");
   await user.drag(at, 60, -60);
   const { scale } = (await top()).pose;

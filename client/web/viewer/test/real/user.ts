@@ -148,8 +148,13 @@ export class User {
 
   async save(entry: string): Promise<Buffer> {
     await this.page.getByRole("button", { name: "Save" }).click();
+    return await this.downloaded(() => this.page.getByRole("menuitem", { name: entry }).click());
+  }
+
+  /** The file that is saved when this is done. */
+  async downloaded(act: () => Promise<void>): Promise<Buffer> {
     const download = this.page.waitForEvent("download", { timeout: 60_000 });
-    await this.page.getByRole("menuitem", { name: entry }).click();
+    await act();
     return readFileSync(await ((await download) as Download).path());
   }
 
