@@ -94,7 +94,7 @@ it.each([
     const trace = await Trace.start(browser, profile);
     await page.mouse("mouseMoved", at.x, at.y);
     await page.mouse("mousePressed", at.x, at.y);
-    await stir(page, at, seconds, isDrawn ? 16 : 3); // more than sixty times a second
+    await stir(page, at, seconds, !isDrawn);
     const { tasks, marks } = await trace.stop("frame-taken");
     const pictures = trace
       .marks("picture-drawn")

@@ -10,13 +10,20 @@ const openButton = `(({ x, y, width, height }) => ({ x: x + width / 2, y: y + he
   [...document.querySelectorAll("button")].find((one) => /^Open/.test(one.getAttribute("aria-label") ?? one.textContent.trim()))
     .getBoundingClientRect())`;
 
-/** Moves the pressed pointer for some time, about sixty times a second, or after so many milliseconds each. */
-export async function stir(page: BarePage, { x, y }: { x: number; y: number }, seconds: number, pause = 16): Promise<void> {
+/**
+ * Moves the pressed pointer for some time. The next move comes 16 ms after the page has had the last one; `isSteady`: every 8 ms, as from
+ * a mouse, whatever the page does.
+ */
+export async function stir(page: BarePage, { x, y }: { x: number; y: number }, seconds: number, isSteady = false): Promise<void> {
   const begin = performance.now();
+  const moves: Promise<void>[] = [];
   for (let now = 0; now < 1000 * seconds; now = performance.now() - begin) {
-    await page.mouse("mouseMoved", x + 60 * Math.sin(now / 500), y + 25 * (1 - Math.cos(now / 400)), true);
-    await new Promise((again) => setTimeout(again, pause));
+    const move = page.mouse("mouseMoved", x + 60 * Math.sin(now / 500), y + 25 * (1 - Math.cos(now / 400)), true);
+    moves.push(move);
+    if (!isSteady) await move;
+    await new Promise((again) => setTimeout(again, isSteady ? 8 : 16));
   }
+  await Promise.all(moves);
 }
 
 interface Reply {
