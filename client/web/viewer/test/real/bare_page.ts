@@ -14,7 +14,12 @@ const openButton = `(({ x, y, width, height }) => ({ x: x + width / 2, y: y + he
  * Moves the pressed pointer for some time. The next move comes 16 ms after the page has had the last one; `isSteady`: every 8 ms, as from
  * a mouse, whatever the page does.
  */
-export async function stir(page: BarePage, { x, y }: { x: number; y: number }, seconds: number, isSteady = false): Promise<void> {
+export async function stir(
+  page: BarePage,
+  { x, y }: { x: number; y: number },
+  seconds: number,
+  isSteady = false,
+): Promise<void> {
   const begin = performance.now();
   const moves: Promise<void>[] = [];
   for (let now = 0; now < 1000 * seconds; now = performance.now() - begin) {
