@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
 import { LpdeformError } from "lpdeform-client";
-import { Blend, mostUnasked } from "../src/app/blend.js";
+import { Blend, mostSoon } from "../src/app/blend.js";
 import type { App } from "../src/app/app.js";
 import { firstFacts } from "../src/app/facts.js";
 import { shapesOf } from "../src/link/prepare.js";
@@ -87,13 +87,13 @@ beforeEach(() => {
 afterEach(() => vi.unstubAllGlobals());
 
 it("a small mesh's shapes are prepared without a press, once nothing is done, and a slider shows them without a change of p", async () => {
-  open(mostUnasked);
+  open(mostSoon);
   await vi.advanceTimersByTimeAsync(1400);
   expect(sessions).toEqual([]);
   await idle();
   for (const _ of blendPs) await solve();
   expect(sessions).toEqual([{ ps: blendPs, isOver: true }]);
-  expect(blend.facts.now).toMatchObject({ waitsForUse: false, ready: blendPs.length, fault: "" });
+  expect(blend.facts.now).toMatchObject({ waitsLong: false, ready: blendPs.length, fault: "" });
   const { p } = app.document;
   expect(blend.show(6)).toMatchObject({ low: 6, high: 6 });
   expect(app.preview.mock.lastCall![0].positions[0]).toBe(6);
@@ -102,11 +102,11 @@ it("a small mesh's shapes are prepared without a press, once nothing is done, an
   expect(sessions).toHaveLength(1);
 });
 
-it("a large mesh's shapes are not prepared before the slider is used, and once more for each work", async () => {
-  open(mostUnasked + 1);
+it("a large mesh's shapes are prepared once nothing is done for long, or sooner when the slider is used", async () => {
+  open(mostSoon + 1);
   await idle();
   await idle();
-  expect(blend.facts.now.waitsForUse).toBe(true);
+  expect(blend.facts.now.waitsLong).toBe(true);
   expect(sessions).toEqual([]);
   expect(blend.show(3)).toBeUndefined();
   await idle();
@@ -114,10 +114,14 @@ it("a large mesh's shapes are not prepared before the slider is used, and once m
   await solve();
   expect(blend.facts.now.ready).toBe(1);
   app.change({ ...app.document, handles: movedHandles(app.document) });
-  await idle();
-  await idle();
+  await vi.advanceTimersByTimeAsync(19_900);
   expect(sessions).toHaveLength(1);
-  expect(blend.facts.now).toMatchObject({ waitsForUse: true, ready: 0 });
+  expect(blend.facts.now).toMatchObject({ waitsLong: true, ready: 0 });
+  await idle();
+  expect(sessions).toHaveLength(2);
+  expect(blend.facts.now.waitsLong).toBe(false);
+  for (const _ of blendPs) await solve();
+  expect(blend.facts.now).toMatchObject({ waitsLong: false, ready: blendPs.length });
 });
 
 it("a drag ends the session at once, and none begins before it is over and solved", async () => {

@@ -9,16 +9,17 @@ import type { App } from "./app.js";
 
 /** How long nothing must have changed before shapes are prepared. */
 const idleMs = 1500;
-/** Shapes of a mesh with more vertices are prepared only once the slider is used. So many take two cores some 20 s. */
-export const mostUnasked = 20_000;
+/** The same for a mesh of more than `mostSoon` vertices whose slider was not used yet. So many take two cores some 20 s. */
+const longIdleMs = 20_000;
+export const mostSoon = 20_000;
 /** A solve sends frames on the way, which nobody sees. */
 const framesPerSecond = 10;
 
 export interface BlendFacts {
   /** The p at which the slider is held. */
   held: number | undefined;
-  /** Whether the mesh is so large that the slider must be used first. */
-  waitsForUse: boolean;
+  /** Whether the mesh is so large that the page waits longer, or until the slider is used. */
+  waitsLong: boolean;
   /** How many shapes are ready. */
   ready: number;
   /** About how long the others take, as far as this is known. */
@@ -39,7 +40,7 @@ function workOf({ handles, paintedP, stiffness, region, isAutomatic }: Document)
 export class Blend {
   readonly facts = new State<BlendFacts>({
     held: undefined,
-    waitsForUse: false,
+    waitsLong: false,
     ready: 0,
     secondsLeft: undefined,
     fault: "",
@@ -86,7 +87,7 @@ export class Blend {
   show(p: number): Blended | undefined {
     if (this.#isCancelled) return undefined;
     this.facts.set({ held: p });
-    if (this.facts.now.waitsForUse || this.facts.now.fault) this.#ask();
+    if (this.facts.now.waitsLong || this.facts.now.fault) this.#ask();
     const found = blended(this.#shapes, p);
     if (found) this.app.preview(found.shape, found.low < found.high ? p : found.low);
     return found;
@@ -133,15 +134,16 @@ export class Blend {
     this.#run.abort();
     const { document: work, mesh } = this.app;
     const isPossible = !work.isAutomatic && work.handles.length > 0;
-    const waitsForUse = isPossible && !this.#isAsked && mesh.positions.length > 3 * mostUnasked;
-    this.facts.set({ waitsForUse, secondsLeft: undefined });
     const isLeft = this.#shapes.size < blendPs.length && this.facts.now.fault === "";
-    const isWanted = isPossible && !waitsForUse && isLeft && document.visibilityState !== "hidden";
-    if (isWanted && this.#mayBecomeQuiet) this.#later();
+    const isWanted = isPossible && isLeft;
+    const waitsLong = isWanted && !this.#isAsked && mesh.positions.length > 3 * mostSoon;
+    this.facts.set({ waitsLong, secondsLeft: undefined });
+    const isSeen = document.visibilityState !== "hidden";
+    if (isWanted && isSeen && this.#mayBecomeQuiet) this.#after(waitsLong ? longIdleMs : idleMs);
   }
 
-  #later(): void {
-    this.#timer = setTimeout(() => (this.#isQuiet ? void this.#prepare() : this.#later()), idleMs);
+  #after(ms: number): void {
+    this.#timer = setTimeout(() => (this.#isQuiet ? void this.#prepare() : this.#after(idleMs)), ms);
   }
 
   /** Otherwise this is tried again when these facts have changed. */
@@ -160,6 +162,7 @@ export class Blend {
   async #prepare(): Promise<void> {
     const { mesh, document } = this.app;
     const { signal } = (this.#run = new AbortController());
+    this.facts.set({ waitsLong: false });
     const begun = performance.now();
     // Each is solved from the one before, also the first that is new.
     const ps = blendPs.slice(Math.max(this.#shapes.size - 1, 0));

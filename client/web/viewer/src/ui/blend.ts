@@ -66,14 +66,14 @@ export function blendPanel(app: App): HTMLElement {
 
 function statusOf(app: App, blend: Blend): string {
   const { isAutomatic, handles } = app.document;
-  const { waitsForUse, ready, secondsLeft, fault } = blend.facts.now;
+  const { waitsLong, ready, secondsLeft, fault } = blend.facts.now;
   if (isAutomatic) return "p comes from the shape: nothing is blended.";
   if (handles.length === 0) return "There is no handle yet.";
   if (fault) return `Not all is ready. ${fault}`;
   const all = blendPs.length;
-  if (waitsForUse) {
+  if (waitsLong) {
     const count = (app.mesh.positions.length / 3).toLocaleString("en");
-    return `For ${count} vertices, shapes are prepared once you move the slider.`;
+    return `For ${count} vertices, shapes are prepared when nothing has changed for 20 seconds, or once you move the slider.`;
   }
   if (ready === all) return "All shapes are ready.";
   if (app.facts.now.status.kind !== "live") return `${ready} of ${all} shapes are ready. The others wait for the server.`;
