@@ -158,7 +158,7 @@ function isSameLook(a: Look, b: Look): boolean {
 function shownIn(stage: Stage): Box {
   const { positions, mesh } = stage.surface!;
   const { min, max } = boundsOf(positions, mesh.faces);
-  const corners = Float32Array.from({ length: 24 }, (_, k) => ((k >> 3) & (1 << (k % 3)) ? max : min)[k % 3]!);
+  const corners = Float32Array.from({ length: 24 }, (_, k) => ((Math.floor(k / 3) >> (k % 3)) & 1 ? max : min)[k % 3]!);
   const screen = [...project(corners, viewProjection(stage), stage.width, stage.height)];
   const [x, y] = [0, 1].map((axis) => screen.filter((_, k) => k % 2 === axis)) as [number[], number[]];
   return { left: Math.min(...x), top: Math.min(...y), right: Math.max(...x), bottom: Math.max(...y) };
