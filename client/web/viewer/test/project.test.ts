@@ -95,7 +95,7 @@ describe("a project", () => {
     }
   });
 
-  it("has doubles, polygons, and an OBJ or GLB file whole", async () => {
+  it("has doubles, polygons, and an OBJ, GLB or PLY file whole", async () => {
     const off = parseMesh(
       "a.off",
       new TextEncoder().encode("OFF\n5 2 0\n0 0 0\n1.1 0 0\n1 1 0\n0 1 0\n2 2 0.3\n4 0 1 2 3\n3 1 4 2\n"),
@@ -103,7 +103,13 @@ describe("a project", () => {
     expect([off.exact, off.corners]).not.toContain(undefined);
     const obj = parseMesh("b.obj", new TextEncoder().encode(`# mine\nvt 0 1\n${writeObj(shape.mesh)}`));
     const gltf = parseMesh("c.glb", newGlb(shape.mesh));
-    for (const mesh of [off, obj, gltf]) {
+    const vertices = ["0 0 0 1", "1 0 0 2", "0 1 0 3"].join("\n");
+    const head =
+      "ply\nformat ascii 1.0\nelement vertex 3\n" + ["x", "y", "z", "s"].map((name) => `property float ${name}\n`).join("");
+    const faces = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    const ply = parseMesh("d.ply", new TextEncoder().encode(`${head}${faces}${vertices}\n3 0 1 2\n`));
+    expect(ply.ply).toBeDefined();
+    for (const mesh of [off, obj, gltf, ply]) {
       const document = addHandle({ ...shape.document, handles: [] }, [0, 1], mesh.positions);
       expect((await read(await writeProject({ ...project, mesh, document }))).mesh).toEqual(mesh);
     }

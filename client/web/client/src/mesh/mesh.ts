@@ -22,6 +22,8 @@ export interface Mesh {
   materials?: Readonly<Record<string, Blob>>;
   /** The GLB file itself, for the same. */
   gltf?: Uint8Array;
+  /** The PLY file itself, if it has other contents, for the same. */
+  ply?: Uint8Array;
 }
 
 /** A mesh to be written, in the precision of its numbers. */

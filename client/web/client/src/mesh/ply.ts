@@ -1,45 +1,14 @@
 import type { Mesh } from "./mesh.js";
 import { MeshBuilder } from "./builder.js";
 import { FileFault } from "./fault.js";
-
-interface Property {
-  name: string;
-  type: string;
-  /** For a list: the type of its length. */
-  lengthType?: string;
-}
-
-interface Element {
-  name: string;
-  count: number;
-  properties: Property[];
-}
+import { type Element, loadNumber, readPlyHeader, sizes } from "./ply_header.js";
 
 /** The largest value of PLY's widest integer type. */
 const mostInList = 2 ** 32 - 1;
 
-const sizes: Record<string, number> = {
-  char: 1,
-  uchar: 1,
-  short: 2,
-  ushort: 2,
-  int: 4,
-  uint: 4,
-  float: 4,
-  double: 8,
-  int8: 1,
-  uint8: 1,
-  int16: 2,
-  uint16: 2,
-  int32: 4,
-  uint32: 4,
-  float32: 4,
-  float64: 8,
-};
-
 /** PLY as text, or binary in either byte order. */
 export function readPly(name: string, bytes: Uint8Array): Mesh {
-  const { format, elements, length } = readHeader(name, bytes);
+  const { format, elements, length } = readPlyHeader(name, bytes);
   const newReader = () =>
     format === "ascii"
       ? textReader(bytes, length)
@@ -65,39 +34,6 @@ function placeOfFace(name: string, elements: readonly Element[], face: number, r
   return "";
 }
 
-function readHeader(name: string, bytes: Uint8Array): { format: string; elements: Element[]; length: number } {
-  const head = new TextDecoder("latin1").decode(bytes.subarray(0, 65_536));
-  const end = /(^|\n)end_header\r?\n/.exec(head);
-  if (!head.startsWith("ply") || !end) throw new FileFault(`${name} has no PLY header.`);
-  let format = "";
-  const elements: Element[] = [];
-  for (const [k, line] of head.slice(0, end.index).split(/\r?\n/).entries()) {
-    const where = `${name}, line ${k + 1}`;
-    const [key, ...words] = line.trim().split(/\s+/);
-    if (key === "format") format = words[0] ?? "";
-    if (key === "element") elements.push({ name: words[0] ?? "", count: countOf(where, words), properties: [] });
-    if (key === "property") {
-      const property: Property =
-        words[0] === "list"
-          ? { name: words[3] ?? "", type: words[2] ?? "", lengthType: words[1] ?? "" }
-          : { name: words[1] ?? "", type: words[0] ?? "" };
-      for (const type of [property.type, property.lengthType ?? property.type]) {
-        if (!(type in sizes))
-          throw new FileFault(`${where}: a property has the type ${type}, which PLY does not know.`);
-      }
-      elements.at(-1)?.properties.push(property);
-    }
-  }
-  if (!["ascii", "binary_little_endian", "binary_big_endian"].includes(format)) {
-    throw new FileFault(`${name} is in the format “${format}”, which PLY does not know.`);
-  }
-  for (const { name: element, count, properties } of elements) {
-    // Rows without bytes would be read for ever.
-    if (count > 0 && properties.length === 0) throw new FileFault(`Element “${element}” of ${name} has no property.`);
-  }
-  return { format, elements, length: end.index + end[0].length };
-}
-
 /** What properties stand for that a mesh here cannot hold. */
 const beside: readonly (readonly [RegExp, string])[] = [
   [/^n[xyz]$/, "normals"],
@@ -111,14 +47,9 @@ function besideOf({ name, count, properties }: Element): string[] {
   const names = properties.map((property) => property.name);
   const own = name === "face" ? /^vertex_ind/ : /^[xyz]$/;
   const others = names.filter((property) => !own.test(property));
-  // Properties that this page has written together with a distortion are written again.
-  if (names.includes("distortion")) return others.filter((property) => !/^(distortion|red|green|blue)$/.test(property));
+  // What the viewer writes anew each time.
+  if (names.join() === "x,y,z,distortion,red,green,blue") return [];
   return others.map((property) => beside.find(([key]) => key.test(property))?.[1] ?? `“${property}”`);
-}
-
-function countOf(where: string, [element, count]: readonly string[]): number {
-  if (Number.isInteger(Number(count)) && Number(count) >= 0) return Number(count);
-  throw new FileFault(`${where}: the element “${element}” has the count “${count}”.`);
 }
 
 function readRow(name: string, element: Element, row: number, reader: Reader, builder: MeshBuilder): void {
@@ -184,31 +115,7 @@ function binaryReader(bytes: Uint8Array, littleEndian: boolean): Reader {
     const start = at;
     at += sizes[type]!;
     if (at > view.byteLength) return undefined;
-    switch (type) {
-      case "char":
-      case "int8":
-        return view.getInt8(start);
-      case "uchar":
-      case "uint8":
-        return view.getUint8(start);
-      case "short":
-      case "int16":
-        return view.getInt16(start, littleEndian);
-      case "ushort":
-      case "uint16":
-        return view.getUint16(start, littleEndian);
-      case "int":
-      case "int32":
-        return view.getInt32(start, littleEndian);
-      case "uint":
-      case "uint32":
-        return view.getUint32(start, littleEndian);
-      case "float":
-      case "float32":
-        return view.getFloat32(start, littleEndian);
-      default:
-        return view.getFloat64(start, littleEndian);
-    }
+    return loadNumber(view, type, start, littleEndian);
   };
   return { next, place: () => "" };
 }

@@ -20,8 +20,10 @@ export function parseMesh(name: string, bytes: Uint8Array, beside?: ReadonlyMap<
       return readOff(name, textOf(name, bytes));
     case "obj":
       return { ...readObj(name, textOf(name, bytes)), obj: bytes, ...materialsIn(beside) };
-    case "ply":
-      return readPly(name, bytes);
+    case "ply": {
+      const mesh = readPly(name, bytes);
+      return mesh.beside ? { ...mesh, ply: bytes } : mesh;
+    }
     case "stl":
       return readStl(name, bytes);
     default:

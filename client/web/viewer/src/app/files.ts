@@ -5,6 +5,7 @@ import { readHandleFile, writeHandleFile } from "../io/handlefile.js";
 import { writeObj } from "../io/write_obj.js";
 import { keepOnly, openedMesh } from "../io/opened.js";
 import { rewriteObj } from "../io/obj_rewrite.js";
+import { keepsPly, rewritePly } from "../io/ply_rewrite.js";
 import { writeOff } from "../io/write_off.js";
 import { writePly } from "../io/write_ply.js";
 import { type Document, emptyDocument } from "../model/document.js";
@@ -137,16 +138,22 @@ export class Files {
     for (const pane of panes) {
       const { mesh } = pane.stage.surface!;
       const { positions, distortion } = await this.#exactly(pane);
-      const { faces, corners, obj, gltf } = mesh;
+      const { faces, corners, obj, gltf, ply } = mesh;
       const deformed: WrittenMesh = { positions, faces, ...(corners && { corners }) };
       const name = `${stem}-deformed${panes.length > 1 ? `-${pane.side}` : ""}.${format}`;
       if (format === "glb") save(name, gltf ? rewriteGlb({ ...mesh, gltf }, positions) : newGlb(deformed));
-      if (format === "ply") save(name, writePly(deformed, distortion, this.app.red, this.app.view.now.palette));
+      if (format === "ply") save(name, this.#plyOf(mesh, deformed, distortion));
       if (format === "obj") save(name, obj ? rewriteObj({ ...mesh, obj }, positions) : writeObj(deformed));
       if (format === "off") save(name, writeOff(deformed));
       if (format === "stl") save(name, (await import("../io/write_stl.js")).writeStl(deformed));
-      this.#sayLost(name, lostIn(mesh, format), obj || gltf ? ` Saved as ${obj ? "OBJ" : "GLB"}, they stay.` : "");
+      const kept = obj ? "OBJ" : gltf ? "GLB" : ply && keepsPly(mesh) ? "PLY" : "";
+      this.#sayLost(name, lostIn(mesh, format), kept && ` Saved as ${kept}, they stay.`);
     }
+  }
+
+  #plyOf(mesh: Mesh, deformed: WrittenMesh, distortion: Exported["distortion"]): Uint8Array<ArrayBuffer> {
+    if (keepsPly(mesh)) return rewritePly(mesh, deformed.positions, distortion);
+    return writePly(deformed, distortion, this.app.red, this.app.view.now.palette);
   }
 
   #sayLost(name: string, lost: readonly string[], better = ""): void {
@@ -317,8 +324,9 @@ function checkSize(what: string, bytes: number): void {
 }
 
 /** What a file had that this format cannot hold, in words. */
-function lostIn({ beside = [], corners, obj, gltf }: Mesh, format: MeshFormat): readonly string[] {
-  if ((format === "obj" && obj) || (format === "glb" && gltf)) return [];
+function lostIn(mesh: Mesh, format: MeshFormat): readonly string[] {
+  const { beside = [], corners, obj, gltf } = mesh;
+  if ((format === "obj" && obj) || (format === "glb" && gltf) || (format === "ply" && keepsPly(mesh))) return [];
   return (format === "stl" || format === "glb") && corners ? [...beside, "faces of more than three corners"] : beside;
 }
 

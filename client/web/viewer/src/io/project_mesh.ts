@@ -3,6 +3,7 @@ import { MeshBuilder } from "lpdeform-client/mesh/builder";
 import { FileFault } from "lpdeform-client/mesh/fault";
 import { readGltf } from "lpdeform-client/mesh/gltf";
 import { readObj } from "lpdeform-client/mesh/obj";
+import { readPly } from "lpdeform-client/mesh/ply";
 import { isObject, type Sections } from "./sections.js";
 
 /** Where each part of a mesh goes in a project; what is “again” comes from the source when that is read. One that is missing does not compile. */
@@ -17,6 +18,7 @@ const parts: { readonly [K in keyof Required<Mesh>]: "head" | "array" | "source"
   obj: "source",
   materials: "files",
   gltf: "source",
+  ply: "source",
 };
 
 interface Stored {
@@ -53,6 +55,7 @@ export function readStoredMesh(json: unknown, arrays: Sections, file: string): M
     const { obj } = arrays;
     return { ...readObj(name, new TextDecoder().decode(obj)), obj, ...materialsIn(arrays) };
   }
+  if (source === "ply" && arrays["ply"] instanceof Uint8Array) return { ...readPly(name, arrays["ply"]), ply: arrays["ply"] };
   if (source === "gltf" && arrays["gltf"] instanceof Uint8Array) return readGltf(name, arrays["gltf"]);
   const { positions, faces, corners } = arrays;
   const isOfNumbers = positions instanceof Float32Array || positions instanceof Float64Array;

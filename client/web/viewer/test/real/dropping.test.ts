@@ -164,6 +164,32 @@ it("an OBJ file keeps what it has beside where it is saved as such, and it is sa
   );
 });
 
+it("a PLY is saved as PLY with its texture coordinates, and as another format it is said that they are gone", async () => {
+  const corners = ["0 0 0 0 0", "1 0 0 1 0", "1 1 0 1 1", "0 1 0 0 1", "0 0 1 0 0", "1 0 1 1 0", "1 1 1 1 1", "0 1 1 0 1"];
+  const faces = ["0 1 5 4", "1 2 6 5", "2 3 7 6", "3 0 4 7"].map((face) => `4 ${face}`);
+  const head = ["x", "y", "z", "s", "t"].map((name) => `property float ${name}`);
+  const list = `element face ${faces.length}\nproperty list uchar int vertex_indices\nend_header`;
+  const file = ["ply\nformat ascii 1.0", `element vertex ${corners.length}`, ...head, list, ...corners, ...faces, ""];
+  await drop({ "tower.ply": file.join("\n") });
+  await isOpen("tower.ply");
+  const handles = [
+    { name: "Foot", vertices: [0, 1, 2, 3] },
+    { name: "Top", vertices: [4, 5, 6, 7], translate: [0, 0, 2] },
+  ];
+  await drop({ "handles.json": JSON.stringify({ handles }) });
+  await user.settled();
+  const saved = (await user.save("Mesh as PLY, with distortion")).toString().split("\n");
+  expect(saved.slice(3, 9)).toEqual([...head, "property float distortion"]);
+  expect(saved.slice(11, 20).map((row) => row.split(" ").slice(0, 5).join(" "))).toEqual(
+    [list.split("\n")[2], ...corners.map((row) => row.replace(/^(. .) 1/, "$1 3"))].slice(0, 9),
+  );
+  expect(saved.slice(20)).toEqual([...faces, ""]);
+  await user.save("Mesh as OFF");
+  const notice = user.page.locator(".notice", { hasText: "does not have what the original file also had" });
+  await notice.waitFor();
+  expect(await notice.textContent()).toContain("texture coordinates. Saved as PLY, they stay.");
+});
+
 /** An OBJ that takes long to open. */
 function longObj(): string {
   const size = 300;
