@@ -86,6 +86,10 @@ it("the session for it is there while it solves, and ends with the last shape an
   await expect.poll(() => count("DeleteSession"), { timeout: 20_000 }).toBe(1);
   await user.ask("app.view.set({ weldTolerance: 1e-4 })");
   await expect.poll(() => count("CreateSession"), { timeout: 20_000 }).toBe(2);
+  // A session whose creation is given up has no name to be deleted by.
+  await status()
+    .filter({ hasText: /^[1-9]\d* of 12 shapes are ready/ })
+    .waitFor();
   await user.page.evaluate(() => {
     Object.defineProperty(document, "visibilityState", { value: "hidden", configurable: true });
     document.dispatchEvent(new Event("visibilitychange"));

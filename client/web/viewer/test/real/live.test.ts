@@ -61,6 +61,7 @@ it("holds nothing of second pictures that were closed", async () => {
       functionDeclaration: "function () { return this.length; }",
       objectId: objects.objectId!,
     });
+    await devtools.send("Runtime.releaseObject", { objectId: objects.objectId! }); // the list holds them, too
     return count.result.value as number;
   };
   // A session that is still being closed holds its picture.
