@@ -148,7 +148,7 @@ describe.each([
   });
 });
 
-describe("a PLY is written anew", () => {
+describe("a PLY is not kept", () => {
   const plain = asText
     .replace(/property float (n[xyz]|s|t)\n/g, "")
     .replace("property uchar red\n", "")

@@ -47,7 +47,7 @@ function besideOf({ name, count, properties }: Element): string[] {
   const names = properties.map((property) => property.name);
   const own = name === "face" ? /^vertex_ind/ : /^[xyz]$/;
   const others = names.filter((property) => !own.test(property));
-  // What the viewer writes anew each time.
+  // The viewer writes these itself, each time from the present shape.
   if (names.join() === "x,y,z,distortion,red,green,blue") return [];
   return others.map((property) => beside.find(([key]) => key.test(property))?.[1] ?? `“${property}”`);
 }

@@ -202,6 +202,14 @@ it.each(sizes)(
   },
 );
 
+/** As it is opened, with the move tool. */
+async function showCreature(isSplit: boolean, isPanelOpen: boolean): Promise<void> {
+  await user.ask(`app.view.set({ isSplit: ${isSplit}, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
+  await user.ask(`app.startOver("creature", "coarse")`);
+  await user.until("window.__lpdeform.app.panes.every(({ stage }) => stage.surface)");
+  await drawn(user);
+}
+
 it.each(sizes)(
   "the options of a tool that is taken cover no shape at %d x %d, as long as nobody has turned the view",
   async (width, height) => {
@@ -209,10 +217,7 @@ it.each(sizes)(
     const found: Record<string, string[]> = {};
     for (const isPanelOpen of [false, true]) {
       for (const isSplit of [false, true]) {
-        await user.ask(`app.view.set({ isSplit: ${isSplit}, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
-        await user.ask(`app.startOver("creature", "coarse")`);
-        await user.until("window.__lpdeform.app.panes.every(({ stage }) => stage.surface)");
-        await drawn(user);
+        await showCreature(isSplit, isPanelOpen);
         await user.ask(`app.view.set({ tool: "paint" })`);
         await drawn(user);
         const all = (await user.page.evaluate(covering)).filter((fault) => !fault.includes("is small"));
@@ -230,10 +235,7 @@ it.each(sizes)(
     const found: Record<string, string[]> = {};
     for (const isPanelOpen of [false, true]) {
       for (const isSplit of [false, true]) {
-        await user.ask(`app.view.set({ isSplit: ${isSplit}, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
-        await user.ask(`app.startOver("creature", "coarse")`);
-        await user.until("window.__lpdeform.app.panes.every(({ stage }) => stage.surface)");
-        await drawn(user);
+        await showCreature(isSplit, isPanelOpen);
         const { notice } = messages;
         await user.page.evaluate(([notice]) => (window as any).__lpdeform.app.facts.set({ notice }), [notice]);
         await drawn(user);
