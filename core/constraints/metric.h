@@ -21,6 +21,9 @@ struct MatrixEntry {
   bool operator==(const MatrixEntry&) const = default;
 };
 
+/// A linear map of directions: a row vector d becomes d T.
+using Turn = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
+
 /// The Hessian of the objective with rotations and cell weights c held fixed, on the free vertices: a reweighted
 /// Laplacian
 ///
@@ -76,19 +79,13 @@ class Metric {
   void extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
               const Points* forces = nullptr) const;
 
-  /// Adds to `forces`, as extend() takes them, those of edges that want to be longer or to turn: sum over j of W_ij wanted(i, j) at
-  /// vertex i. W_ij = 2 (c_i + c_j) w_ij, and wanted(j, i) = -wanted(i, j). The same bits on any number of threads.
-  template <typename Wanted>
-  void add_edge_forces(const Wanted& wanted, const Workers& workers, Points& forces) const {
-    workers.for_chunks(static_cast<std::size_t>(forces.rows()), kChunk,
-                       [&](std::size_t, std::size_t begin, std::size_t end) {
-                         for (auto i = static_cast<std::int32_t>(begin); i < static_cast<std::int32_t>(end);
-                              ++i) {
-                           for (std::int32_t k = shape_->offsets()[i]; k < shape_->offsets()[i + 1]; ++k)
-                             forces.row(i) += scale_ * edge_weight(i, k) * wanted(i, shape_->neighbours()[k]);
-                         }
-                       });
-  }
+  /// The forces, as extend() takes them, that turn the edges of `from` and leave those of `to` as they then are:
+  ///
+  ///   sum over j of W_ij ((from_i - from_j) (T_i + T_j) / 2 - (to_i - to_j))    at vertex i, W_ij = 2 (c_i + c_j) w_ij
+  ///
+  /// T is `turns`. The same bits on any number of threads.
+  Points turning_forces(const Points& from, const Points& to, const std::vector<Turn>& turns,
+                        const Workers& workers) const;
 
   /// c_i as factored, clipped.
   double cell_weight(std::int32_t i) const { return scale_ * cell_weights_[i]; }

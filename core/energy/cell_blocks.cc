@@ -46,7 +46,6 @@ CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk, const Workers&
 
   LPDEFORM_CHECK(slot_count() * kLanes <= std::numeric_limits<std::uint32_t>::max());
 
-  centre.resize(cells.size());
   rest_size.resize(cells.size());
   neighbour.resize(slot_count() * kLanes);
   weight.resize(slot_count() * kLanes);
@@ -72,7 +71,6 @@ CellBlocks::CellBlocks(const RestShape& shape, std::size_t chunk, const Workers&
 void CellBlocks::fill(const RestShape& shape, std::size_t c, std::vector<std::uint32_t>& place_of_entry) {
   const std::size_t lane = c % kLanes, block = c / kLanes;
   const std::int32_t i = cells[c];
-  centre[c] = std::max(i, 0);
   const std::int32_t begin = i < 0 ? 0 : shape.offsets()[i], end = i < 0 ? 0 : shape.offsets()[i + 1];
   for (std::size_t slot = first_slot[block]; slot < first_slot[block + 1]; ++slot) {
     const std::size_t at = slot * kLanes + lane;
@@ -90,8 +88,7 @@ void CellBlocks::fill(const RestShape& shape, std::size_t c, std::vector<std::ui
 }
 
 std::size_t CellBlocks::memory_bytes() const {
-  return (first_slot.capacity() + cells.capacity() + centre.capacity() + neighbour.capacity() +
-          opposite.capacity()) *
+  return (first_slot.capacity() + cells.capacity() + neighbour.capacity() + opposite.capacity()) *
              sizeof(std::int32_t) +
          (rest_size.capacity() + weight.capacity()) * sizeof(double);
 }

@@ -28,7 +28,6 @@ struct CellBlocks {
   std::vector<std::uint32_t> first_slot;  // of each block; the last entry is the end
   std::size_t most_slots = 0;             // the most slots that a block has
   std::vector<std::int32_t> cells;        // [block][lane]: vertex; -1 in lanes without a cell
-  std::vector<std::int32_t> centre;       // [block][lane]: vertex; 0 in lanes without a cell
   std::vector<double> rest_size;          // [block][lane]: sum_j w_ij |p_i - p_j|^2
 
   std::vector<std::int32_t> neighbour;  // [slot][lane]: vertex; 0 in lanes without a cell

@@ -66,7 +66,9 @@ HWY_INLINE FitSums gather_edges(const CellBlocks& blocks, std::size_t block, std
                                 const double* rows, double* edges) {
   const D d;
   FitSums sums{zero_matrix(), hn::Zero(d)};
-  const std::int32_t* const cells = blocks.centre.data() + block * kLanes + lane;
+  std::int32_t cells[kLanes];
+  for (std::size_t k = 0; k < hn::Lanes(d); ++k)
+    cells[k] = std::max(blocks.cells[block * kLanes + lane + k], 0);
   const Vector centre = gather(rows, cells), rest_centre = gather_packed(blocks.rest, cells);
   for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1];
        ++slot, edges += kEdge) {
@@ -97,7 +99,6 @@ HWY_INLINE void subtract_rotated(const CellBlocks& blocks, std::size_t block, st
   const D d;
   const Matrix rotation = load_matrix(rotations + lane);
   V squared = hn::Zero(d);
-  Vector sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
   for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1];
        ++slot, edges += kEdge) {
     const V w = hn::LoadU(d, blocks.weight.data() + slot * kLanes + lane);
@@ -105,11 +106,9 @@ HWY_INLINE void subtract_rotated(const CellBlocks& blocks, std::size_t block, st
     const Vector r = difference(load(edges + lane), turned);
     const Vector wr{hn::Mul(w, r.x), hn::Mul(w, r.y), hn::Mul(w, r.z)};
     squared = hn::Add(squared, dot(wr, r));
-    sum = {hn::Add(sum.x, wr.x), hn::Add(sum.y, wr.y), hn::Add(sum.z, wr.z)};
     store_packed(wr, state.residuals.data() + (slot * kLanes + lane) * 3);
   }
   hn::StoreU(squared, d, squares + lane);
-  store_rows(sum, state.residual_sums.data() + (block * kLanes + lane) * kRow);
 }
 
 /// Fits all lanes of a block.
@@ -159,9 +158,6 @@ void GradientOfBlocks(const CellBlocks& blocks, std::size_t first, std::size_t l
                       const double* c, double* gradient) {
   using Row = double __attribute__((vector_size(kRow * sizeof(double)), aligned(sizeof(double))));
   using SingleRow = float __attribute__((vector_size(kRow * sizeof(float)), aligned(sizeof(float))));
-  const auto sum_of = [&](std::size_t at) -> const Row& {
-    return *reinterpret_cast<const Row*>(state.residual_sums.data() + at * kRow);
-  };
   const auto residual = [&](std::size_t at) -> const SingleRow& {
     return *reinterpret_cast<const SingleRow*>(state.residuals.data() + at * 3);  // the fourth is not used
   };
@@ -170,10 +166,12 @@ void GradientOfBlocks(const CellBlocks& blocks, std::size_t first, std::size_t l
     const std::int32_t* const cells = blocks.cells.data() + block * kLanes;
     for (std::size_t lane = 0; lane < kLanes && cells[lane] >= 0; ++lane) {
       const std::int32_t i = cells[lane];
-      Row sum = c[i] * sum_of(block * kLanes + lane);
+      Row own{}, others{};
       for (std::size_t at = begin * kLanes + lane; at < end * kLanes; at += kLanes) {
-        sum -= c[blocks.neighbour[at]] * __builtin_convertvector(residual(blocks.opposite[at]), Row);
+        own += __builtin_convertvector(residual(at), Row);
+        others += c[blocks.neighbour[at]] * __builtin_convertvector(residual(blocks.opposite[at]), Row);
       }
+      const Row sum = c[i] * own - others;
       for (std::size_t axis = 0; axis < 3; ++axis)
         gradient[3 * static_cast<std::size_t>(i) + axis] = 2 * sum[axis];
     }
@@ -192,7 +190,6 @@ HWY_EXPORT(GradientOfBlocks);
 BlockState::BlockState(const CellBlocks& blocks)
     : squared(static_cast<std::size_t>(std::find(blocks.cells.begin(), blocks.cells.end(), -1) -
                                        blocks.cells.begin())),
-      residual_sums(blocks.cells.size() * kRow),
       residuals(blocks.slot_count() * CellBlocks::kLanes * 3 + 1) {}
 
 void BlockState::keep_rotations(const CellBlocks& blocks) {
@@ -206,8 +203,7 @@ void BlockState::keep_rotations(const CellBlocks& blocks) {
 }
 
 std::size_t BlockState::memory_bytes() const {
-  return (rotations.capacity() + squared.capacity() + residual_sums.capacity()) * sizeof(double) +
-         residuals.capacity() * sizeof(float);
+  return (rotations.capacity() + squared.capacity()) * sizeof(double) + residuals.capacity() * sizeof(float);
 }
 
 void evaluate_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const double* rows,

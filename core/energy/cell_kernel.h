@@ -17,9 +17,8 @@ struct BlockState {
   /// Makes room for rotations, so that evaluations store them.
   void keep_rotations(const CellBlocks& blocks);
 
-  std::vector<double> rotations;      // [block][entry, row-major][lane]: R_i; empty if they are not kept
-  std::vector<double> squared;        // of each vertex: E_i^2
-  std::vector<double> residual_sums;  // [block][lane][axis, filler]: sum_j r_ij
+  std::vector<double> rotations;  // [block][entry, row-major][lane]: R_i; empty if they are not kept
+  std::vector<double> squared;    // of each vertex: E_i^2
   std::vector<float>
       residuals;  // [slot][lane][axis], then a filler: r_ij = w_ij ((x_i - x_j) - R_i (p_i - p_j));
   // single precision: a small relative error is harmless, and memory bandwidth is the bottleneck
@@ -35,7 +34,7 @@ void evaluate_blocks(const CellBlocks& blocks, std::size_t first, std::size_t la
 /// Computes the gradient rows of the cells of these blocks from the state of all blocks and the weights c_i of the
 /// vertices:
 ///
-///   df/dx_i = 2 (c_i sum_j r_ij - sum_j c_j r_ji)
+///   df/dx_i = 2 sum_j (c_i r_ij - c_j r_ji)
 void gradient_of_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last,
                         const BlockState& state, const double* c, double* gradient);
 

@@ -104,13 +104,7 @@ HWY_INLINE Vector gather_packed(const double* rows, const std::int32_t* indices)
 #endif
 }
 
-/// Stores consecutive rows of kRow numbers, one row per lane.
-HWY_INLINE void store_rows(const Vector& v, double* at) {
-  const D d;
-  hn::StoreInterleaved4(v.x, v.y, v.z, hn::Zero(d), d, at);
-}
-
-/// The same in single precision, three numbers each.
+/// Stores consecutive rows of three numbers in single precision, one row per lane.
 HWY_INLINE void store_packed(const Vector& v, float* at) {
   const hn::Rebind<float, D> d;
   hn::StoreInterleaved3(hn::DemoteTo(d, v.x), hn::DemoteTo(d, v.y), hn::DemoteTo(d, v.z), d, at);

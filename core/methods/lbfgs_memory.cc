@@ -21,7 +21,7 @@ std::vector<KeptPair> LbfgsMemory::kept() const {
 
 /// The sums of sweep_products over all chunks, added in chunk order.
 std::vector<double> LbfgsMemory::products(const Points& gradient, const Points& gradient_before,
-                                          const Points& h, const Points& h_before, double length,
+                                          const SinglePoints& h, const SinglePoints& h_before, double length,
                                           const Points& d) {
   const auto count = static_cast<std::size_t>(gradient.size());
   candidate_.s.resize(count);
@@ -58,10 +58,10 @@ void LbfgsMemory::take_in(const std::vector<double>& sums) {
   }
 }
 
-double LbfgsMemory::direction(const Points& gradient, const Points& gradient_before, const Points& h,
-                              const Points& h_before, double length, Points& d) {
+double LbfgsMemory::direction(const Points& gradient, const Points& gradient_before, const SinglePoints& h,
+                              const SinglePoints& h_before, double length, Points& d) {
   if (length == 0) {
-    d = -gamma_ * h;
+    d = -gamma_ * h.cast<double>();
     return gradient.cwiseProduct(d).sum();
   }
   std::vector<double> sums = products(gradient, gradient_before, h, h_before, length, d);

@@ -9,6 +9,8 @@
 
 namespace lpdeform {
 
+using SinglePoints = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
 /// The memory of L-BFGS and its inverse Hessian H in compact form (Byrd, Nocedal & Schnabel 1994, theorem 2.2):
 ///
 ///   H g = gamma h + S R^-T ((D + gamma W) a - gamma Z^T g) - gamma Z a,   a = R^-1 S^T g,   h = M^-1 g
@@ -19,8 +21,7 @@ namespace lpdeform {
 /// the residuals, which is (p - 1) times as large, so full steps would be too long. Where rotations follow a step, it
 /// overestimates the curvature, so full steps would be about half as long as they should be. clear() keeps gamma.
 ///
-/// Each iteration makes only two passes over all vectors. Pairs are stored in single precision, since they only affect
-/// the search direction. Runs in parallel in fixed chunks, which gives the same bits on any number of threads. One
+/// Each iteration makes only two passes over all vectors. Pairs and h are in single precision, since they only affect the search direction. Runs in parallel in fixed chunks, which gives the same bits on any number of threads. One
 /// caller at a time.
 class LbfgsMemory {
  public:
@@ -34,8 +35,8 @@ class LbfgsMemory {
   /// d = -H g; returns <g, d>. `length` > 0 means that the step length * d was made since the last call, at which
   /// gradient and h were gradient_before and h_before. Its pair is then stored, unless <s, y> is not positive to
   /// rounding. Pass 0 if no step was made, or after clear(); then d = -gamma h.
-  double direction(const Points& gradient, const Points& gradient_before, const Points& h,
-                   const Points& h_before, double length, Points& d);
+  double direction(const Points& gradient, const Points& gradient_before, const SinglePoints& h,
+                   const SinglePoints& h_before, double length, Points& d);
 
  private:
   struct Pair {
@@ -43,8 +44,8 @@ class LbfgsMemory {
     std::vector<double> sy, zy;  // <s_i, y>, <z_i, y> with this pair's y, for all older pairs i and this one
   };
   std::vector<KeptPair> kept() const;
-  std::vector<double> products(const Points& gradient, const Points& gradient_before, const Points& h,
-                               const Points& h_before, double length, const Points& d);
+  std::vector<double> products(const Points& gradient, const Points& gradient_before, const SinglePoints& h,
+                               const SinglePoints& h_before, double length, const Points& d);
   void take_in(const std::vector<double>& sums);
 
   Workers workers_;

@@ -61,14 +61,15 @@ HWY_INLINE void two_products(const float* a, const double* b, const double* c, s
 
 void SweepProducts(const NewPair& pair, std::span<const KeptPair> kept, std::size_t begin, std::size_t end,
                    double* sums) {
-  double y[kStretch];
+  double y[kStretch], h[kStretch];
   for (std::size_t at = begin; at < end; at += kStretch) {
     const std::size_t count = std::min(kStretch, end - at);
-    const double *const g = pair.gradient + at, *const h = pair.h + at;
+    const double* const g = pair.gradient + at;
     for (std::size_t k = 0; k < count; ++k) {
       y[k] = g[k] - pair.gradient_before[at + k];
+      h[k] = static_cast<double>(pair.h[at + k]);
       pair.s[at + k] = static_cast<float>(pair.length * pair.step[at + k]);
-      pair.z[at + k] = static_cast<float>(h[k] - pair.h_before[at + k]);
+      pair.z[at + k] = pair.h[at + k] - pair.h_before[at + k];
     }
     sums[0] += product(pair.step + at, pair.step + at, count);
     sums[1] += product(y, y, count);
@@ -84,13 +85,13 @@ void SweepProducts(const NewPair& pair, std::span<const KeptPair> kept, std::siz
   }
 }
 
-void SweepDirection(double gamma, const double* h, std::span<const KeptPair> kept, const double* s_factors,
+void SweepDirection(double gamma, const float* h, std::span<const KeptPair> kept, const double* s_factors,
                     const double* z_factors, std::size_t begin, std::size_t end, double* d) {
   const D tag;
   const std::size_t lanes = hn::Lanes(tag);
   for (std::size_t at = begin; at < end; at += kStretch) {
     const std::size_t last = std::min(at + kStretch, end);
-    for (std::size_t k = at; k < last; ++k) d[k] = -gamma * h[k];
+    for (std::size_t k = at; k < last; ++k) d[k] = -gamma * static_cast<double>(h[k]);
     for (std::size_t i = 0; i < kept.size(); ++i) {
       const float *const s = kept[i].s, *const z = kept[i].z;
       const V a = hn::Set(tag, s_factors[i]), b = hn::Set(tag, z_factors[i]);
@@ -120,7 +121,7 @@ void sweep_products(const NewPair& pair, std::span<const KeptPair> kept, std::si
   HWY_DYNAMIC_DISPATCH(SweepProducts)(pair, kept, begin, end, sums);
 }
 
-void sweep_direction(double gamma, const double* h, std::span<const KeptPair> kept, const double* s_factors,
+void sweep_direction(double gamma, const float* h, std::span<const KeptPair> kept, const double* s_factors,
                      const double* z_factors, std::size_t begin, std::size_t end, double* d) {
   HWY_DYNAMIC_DISPATCH(SweepDirection)(gamma, h, kept, s_factors, z_factors, begin, end, d);
 }

@@ -8,7 +8,7 @@ namespace lpdeform {
 /// The inputs and outputs for a new pair of L-BFGS; see LbfgsMemory::direction.
 struct NewPair {
   const double *gradient, *gradient_before;  // y = gradient - gradient_before
-  const double *h, *h_before;                // z = h - h_before
+  const float *h, *h_before;                 // z = h - h_before
   const double* step;                        // s = length * step
   double length;
   float *s, *z;  // outputs
@@ -27,7 +27,7 @@ void sweep_products(const NewPair& pair, std::span<const KeptPair> kept, std::si
 inline constexpr std::size_t kSumsBefore = 3, kSumsOfPair = 4;
 
 /// d = -gamma h - sum_i (s_factors[i] s_i + z_factors[i] z_i) for the numbers [begin, end).
-void sweep_direction(double gamma, const double* h, std::span<const KeptPair> kept, const double* s_factors,
+void sweep_direction(double gamma, const float* h, std::span<const KeptPair> kept, const double* s_factors,
                      const double* z_factors, std::size_t begin, std::size_t end, double* d);
 
 }  // namespace lpdeform

@@ -172,14 +172,26 @@ bool QuasiNewton::refresh_metric() {
   if (!problem_.factor_metric(metric_weights(), Metric::Precision::kSingle)) return false;
   if (problem_.metric.version() == version && problem_.metric.scale() == scale) return true;
   memory_.clear();
-  if (step_length_ > 0) problem_.precondition(gradient_before_, preconditioned_);
+  if (step_length_ > 0) find_preconditioned(gradient_before_);
   return true;
+}
+
+/// preconditioned_ = M^-1 gradient.
+void QuasiNewton::find_preconditioned(const Points& gradient) {
+  problem_.precondition(gradient, trial_);
+  preconditioned_.resize(trial_.rows(), 3);
+  problem_.workers().for_chunks(static_cast<std::size_t>(trial_.size()), 3 * kChunk,
+                                [&](std::size_t, std::size_t begin, std::size_t end) {
+                                  std::transform(trial_.data() + begin, trial_.data() + end,
+                                                 preconditioned_.data() + begin,
+                                                 [](double value) { return static_cast<float>(value); });
+                                });
 }
 
 /// d = -H g with the H_0 of LbfgsMemory. Returns <g, d>.
 double QuasiNewton::direction() {
   preconditioned_.swap(preconditioned_before_);
-  problem_.precondition(gradient_, preconditioned_);
+  find_preconditioned(gradient_);
   const double slope = memory_.direction(gradient_, gradient_before_, preconditioned_, preconditioned_before_,
                                          step_length_, direction_);
   problem_.constraints.linear.restrict(direction_);  // pairs are kept in single precision

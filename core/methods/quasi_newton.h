@@ -64,6 +64,7 @@ class QuasiNewton : public Minimiser {
   std::vector<double> metric_weights() const;
   bool adopt_metric();
   void find_gradient();
+  void find_preconditioned(const Points& gradient);
   void forget();
   bool refresh_metric();
   double direction();
@@ -81,10 +82,11 @@ class QuasiNewton : public Minimiser {
   bool is_last_stage_ = false;
   LpNorm norm_;  // the stage's norm
   bool is_true_norm_ = false;
-  Points x_, trial_, direction_;
-  Points gradient_, gradient_before_;              // before the last step
-  Points preconditioned_, preconditioned_before_;  // M^-1 times the gradients
-  double last_length_ = 1;                         // the last step's length
+  Points x_, direction_;
+  Points trial_;                                         // or workspace
+  Points gradient_, gradient_before_;                    // before the last step
+  SinglePoints preconditioned_, preconditioned_before_;  // M^-1 times the gradients
+  double last_length_ = 1;                               // the last step's length
   double step_length_ = 0;  // of the last step along direction_, while its pair is not stored yet
   double objective_ = 0;
   double smoothing_sum_ = 0;  // part of objective_; if p is mixed, in the last stage

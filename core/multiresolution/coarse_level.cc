@@ -75,14 +75,15 @@ void CoarseLevel::find_guides(const RestShape& fine) {
     const double farthest = near.size() > kGuides ? near[kGuides].first : near.back().first * 1.5 + unit;
     Guides guides{};
     guides.vertex.fill(own);
+    std::array<double, kGuides> weights{};
     double sum = 0;
     for (std::size_t k = 0; k < std::min(kGuides, near.size()); ++k) {
       guides.vertex[k] = near[k].second;
       const double weight = 1 / (near[k].first + least) - 1 / (farthest + least);
-      sum += guides.weight[k] = weight * weight;
+      sum += weights[k] = weight * weight;
     }
-    if (!(sum > 0)) sum = guides.weight[0] = 1;
-    for (double& weight : guides.weight) weight /= sum;
+    if (!(sum > 0)) sum = weights[0] = 1;
+    for (std::size_t k = 0; k < kGuides; ++k) guides.weight[k] = static_cast<float>(weights[k] / sum);
     guides_[v] = guides;
   }
 }
@@ -110,6 +111,7 @@ absl::Status CoarseLevel::restrict_inputs(const FineInputs& fine) {
 }
 
 absl::Status CoarseLevel::take_over(const FineInputs& fine) {
+  led_to_.reset();
   solver_->set_bending(fine.bending);
   return restrict_inputs(fine);
 }
@@ -121,7 +123,11 @@ bool CoarseLevel::can_lead(const RestShape& fine, double bending) {
 
 std::optional<CoarseMotion> CoarseLevel::lead(const FineInputs& fine, const Points* from,
                                               const Workers& workers, std::stop_token stop) {
-  const Pose before = from ? pose(fine.shape) : rest_pose(fine.shape);
+  std::optional<Pose> before = std::exchange(led_to_, {});
+  if (!from)
+    before = rest_pose(fine.shape);
+  else if (!before)
+    before = pose(fine.shape);
   if (!restrict_inputs(fine).ok()) return std::nullopt;
   bend_like_fine();
   SolveSettings settings;
@@ -134,13 +140,15 @@ std::optional<CoarseMotion> CoarseLevel::lead(const FineInputs& fine, const Poin
   if (!solver_->start(settings, std::move(stop)).ok()) return std::nullopt;
   while (solver_->step()) {
   }
+  led_to_ = pose(fine.shape);
   CoarseMotion motion;
   motion.positions =
-      carried(from ? *from : fine.shape.scaled_positions(), before, pose(fine.shape), workers, &motion.turns);
+      carried(from ? *from : fine.shape.scaled_positions(), *before, *led_to_, workers, &motion.turns);
   return motion;
 }
 
 absl::Status CoarseLevel::go_to(const FineInputs& fine, const Points& x) {
+  led_to_.reset();
   absl::Status status = restrict_inputs(fine);
   bend_like_fine();
   Points positions(static_cast<Eigen::Index>(fine_vertex_.size()), 3);
@@ -154,38 +162,48 @@ absl::Status CoarseLevel::go_to(const FineInputs& fine, const Points& x) {
 
 CoarseLevel::Pose CoarseLevel::rest_pose(const RestShape& fine) const {
   Pose rest{Points(static_cast<Eigen::Index>(fine_vertex_.size()), 3),
-            std::vector<Eigen::Matrix3d>(fine_vertex_.size(), Eigen::Matrix3d::Identity())};
+            std::vector<Turn>(fine_vertex_.size(), Turn::Identity())};
   for (std::size_t c = 0; c < fine_vertex_.size(); ++c)
     rest.positions.row(static_cast<Eigen::Index>(c)) = fine.scaled_positions().row(fine_vertex_[c]);
   return rest;
 }
 
 CoarseLevel::Pose CoarseLevel::pose(const RestShape& fine) const {
-  return {(solver_->positions().rowwise() - fine.centre()) / fine.mean_edge_length(), solver_->rotations()};
+  Pose now{(solver_->positions().rowwise() - fine.centre()) / fine.mean_edge_length(), {}};
+  now.rotations.reserve(fine_vertex_.size());
+  for (const Eigen::Matrix3d& rotation : solver_->rotations())
+    now.rotations.push_back(rotation.cast<float>());
+  return now;
 }
 
 /// The fine surface `from`, moved as its guides have moved from one coarse state to another. With `turns`, writes them too.
 Points CoarseLevel::carried(const Points& from, const Pose& before, const Pose& now, const Workers& workers,
-                            std::vector<Eigen::Matrix3d>* turns) const {
-  std::vector<Eigen::Matrix3d> coarse_turns(fine_vertex_.size());
-  for (std::size_t c = 0; c < coarse_turns.size(); ++c)
-    coarse_turns[c] = before.rotations[c] * now.rotations[c].transpose();
+                            std::vector<Turn>* turns) const {
+  // A row vector d becomes d M.topRows<3>() + M.row(3).
+  using RigidMotion = Eigen::Matrix<double, 4, 3, Eigen::RowMajor>;
+  std::vector<RigidMotion> coarse_motions(fine_vertex_.size());
+  workers.for_chunks(coarse_motions.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t c = begin; c < end; ++c) {
+      const auto row = static_cast<Eigen::Index>(c);
+      RigidMotion& motion = coarse_motions[c];
+      motion.topRows<3>() = before.rotations[c].cast<double>() * now.rotations[c].cast<double>().transpose();
+      motion.row(3) = now.positions.row(row) - before.positions.row(row) * motion.topRows<3>();
+    }
+  });
   Points result(from.rows(), 3);
   if (turns) turns->resize(static_cast<std::size_t>(from.rows()));
   const auto place = [&](std::size_t v) {
     const auto row = static_cast<Eigen::Index>(v);
-    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
-    Eigen::Matrix3d turn = Eigen::Matrix3d::Zero();
     const Guides& guides = guides_[v];
+    double sum = 0;
+    RigidMotion motion = RigidMotion::Zero();
     for (std::size_t k = 0; k < kGuides; ++k) {
-      const std::int32_t c = guides.vertex[k];
-      if (guides.weight[k] == 0) continue;
-      const Eigen::RowVector3d offset = from.row(row) - before.positions.row(c);
-      sum += guides.weight[k] * (now.positions.row(c) + offset * coarse_turns[c]);
-      turn += guides.weight[k] * coarse_turns[c];
+      motion += guides.weight[k] * coarse_motions[guides.vertex[k]];
+      sum += guides.weight[k];
     }
-    result.row(row) = sum;
-    if (turns) (*turns)[v] = turn;
+    motion /= sum;
+    result.row(row) = from.row(row) * motion.topRows<3>() + motion.row(3);
+    if (turns) (*turns)[v] = motion.topRows<3>().cast<float>();
   };
   workers.for_chunks(guides_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) place(v);
@@ -210,7 +228,7 @@ void CoarseLevel::bend_like_fine() {
 std::size_t CoarseLevel::memory_bytes() const {
   return (fine_vertex_.capacity() + coarse_vertex_.capacity()) * sizeof(std::int32_t) +
          share_.capacity() * sizeof(double) + guides_.capacity() * sizeof(Guides) + shape_->memory_bytes() +
-         solver_->memory_bytes();
+         solver_->memory_bytes() + (led_to_ ? led_to_->memory_bytes() : 0);
 }
 
 }  // namespace lpdeform

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/constraints/constraints.h"
+#include "core/constraints/metric.h"
 #include "core/energy/material.h"
 #include "core/energy/rest_shape.h"
 #include "core/mesh/coarsen.h"
@@ -25,8 +26,8 @@ struct FineInputs {
 
 /// How the fine surface goes with a coarse level that has moved.
 struct CoarseMotion {
-  Points positions;                    // scaled units of the fine shape
-  std::vector<Eigen::Matrix3d> turns;  // a row vector d at vertex v becomes d turns[v]; a blend of rotations
+  Points positions;         // scaled units of the fine shape
+  std::vector<Turn> turns;  // of each vertex; blends of rotations
 };
 
 /// A coarse level: a shape with a sixth of the fine shape's vertices, a solver of its own, and the restriction and
@@ -83,7 +84,11 @@ class CoarseLevel {
   /// A coarse state: positions in scaled units of the fine shape, and the fitted rotations of the cells.
   struct Pose {
     Points positions;
-    std::vector<Eigen::Matrix3d> rotations;
+    std::vector<Turn> rotations;
+
+    std::size_t memory_bytes() const {
+      return positions.size() * sizeof(double) + rotations.capacity() * sizeof(Turn);
+    }
   };
 
   CoarseLevel() = default;
@@ -92,14 +97,14 @@ class CoarseLevel {
   Pose rest_pose(const RestShape& fine) const;
   Pose pose(const RestShape& fine) const;
   Points carried(const Points& from, const Pose& before, const Pose& now, const Workers& workers,
-                 std::vector<Eigen::Matrix3d>* turns) const;
+                 std::vector<Turn>* turns) const;
 
   static constexpr std::int32_t kLeastEased = 30000;  // fine vertices from which on bend_like_fine() pays off
 
   static constexpr std::size_t kGuides = 4;
   struct Guides {
     std::array<std::int32_t, kGuides> vertex;  // coarse
-    std::array<double, kGuides> weight;        // weights add up to 1
+    std::array<float, kGuides> weight;         // weights add up to 1
   };
   std::vector<std::int32_t> fine_vertex_, coarse_vertex_;  // see CoarseMesh
   std::vector<double> share_;                              // the number of fine vertices of each coarse one
@@ -107,6 +112,7 @@ class CoarseLevel {
   std::shared_ptr<const RestShape> shape_;
   double bending_ = 1;  // of the fine level
   std::unique_ptr<LevelSolver> solver_;
+  std::optional<Pose> led_to_;  // the solver's state, where lead() has come to it
 };
 
 }  // namespace lpdeform

@@ -15,12 +15,12 @@
 namespace lpdeform {
 namespace {
 
-// What a running solve holds, in positions of all vertices: QuasiNewton has 7 states, gradients and directions, and 7
-// pairs of L-BFGS in single precision.
-constexpr std::size_t kWorkspace = 14;
+// What a running solve holds, in positions of all vertices: QuasiNewton has 5 states, gradients and directions, and in single precision
+// 2 more and 7 pairs of L-BFGS.
+constexpr std::size_t kWorkspace = 13;
 // What a Deformer holds besides: x, positions, x_before_move, energies and weights.
 constexpr std::size_t kStates = 4;
-constexpr std::size_t kCellBytes = 96, kEdgeBytes = 30;  // of CellPass: per vertex, per directed edge
+constexpr std::size_t kCellBytes = 60, kEdgeBytes = 30;  // of CellPass: per vertex, per directed edge
 constexpr std::size_t kCoarseShare = 4;                  // the coarse levels take about 1 / kCoarseShare more
 constexpr std::int32_t kCoarsenBeforehand = 10000;  // vertices from which on cold solves have a coarse level
 
@@ -55,17 +55,22 @@ absl::StatusOr<std::unique_ptr<Deformer>> Deformer::create(std::shared_ptr<const
     return options.admit(has_coarse ? own + own / kCoarseShare : own);
   };
   std::optional<absl::StatusOr<Metric>> metric;
+  std::optional<Objective> objective;
   std::optional<CoarseMesh> coarse;
   const Workers workers(shape->vertex_count() < options.parallel_from ? 1 : options.threads);
-  workers.run_both([&] { metric = Metric::create(shape, admit); },
-                   [&] {
-                     if (workers.threads() > 1 && shape->vertex_count() >= kCoarsenBeforehand)
-                       coarse = CoarseLevel::coarsened(*shape);
-                   });
+  workers.run_both(
+      [&] {
+        metric = Metric::create(shape, admit);
+        if (metric->ok()) objective.emplace(shape, workers);
+      },
+      [&] {
+        if (workers.threads() > 1 && shape->vertex_count() >= kCoarsenBeforehand)
+          coarse = CoarseLevel::coarsened(*shape);
+      });
   if (!metric->ok()) return metric->status();
   options.admit = nullptr;
-  return std::unique_ptr<Deformer>(new Deformer(
-      std::make_unique<Impl>(std::move(shape), std::move(options), **std::move(metric), std::move(coarse))));
+  return std::unique_ptr<Deformer>(new Deformer(std::make_unique<Impl>(
+      std::move(shape), std::move(options), *std::move(objective), **std::move(metric), std::move(coarse))));
 }
 
 const RestShape& Deformer::shape() const {

@@ -7,6 +7,7 @@
 namespace lpdeform {
 namespace {
 
+constexpr std::size_t kChunk = 4096;  // vertices
 constexpr double kFarthestGuess = 2;  // the guess continues the last move by less than this factor
 constexpr double kSameWay = 0.5;      // two moves count as one drag above this squared cosine between them
 // In such a drag, the squared ratio of the surface's largest move to the handles' largest move is below this.
@@ -45,19 +46,21 @@ std::optional<Points> Deformer::Impl::led_guess() {
       coarse->lead(coarse_inputs(effective_material()), is_ahead ? nullptr : &x, workers(), stop);
   if (!motion) return std::nullopt;
   const Points& moved = motion->positions;
-  Points u = Points::Zero(x.rows(), 3), forces = u;
-  metric.add_edge_forces(
-      [&](std::int32_t i, std::int32_t j) -> Eigen::RowVector3d {
-        const Eigen::Matrix3d turn = 0.5 * (motion->turns[i] + motion->turns[j]);
-        return (from.row(i) - from.row(j)) * turn - (moved.row(i) - moved.row(j));
-      },
-      workers(), forces);
+  const Points forces = metric.turning_forces(from, moved, motion->turns, workers());
+  Points u(x.rows(), 3);
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     if (constraints->is_held[i]) u.row(i) = constraints->targets.row(i) - moved.row(i);
   }
   metric.extend(constraints->is_held, u, workers(), &forces);
-  u += moved;
-  if (!u.allFinite()) return std::nullopt;
+  workers().for_chunks(
+      constraints->is_held.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+        for (auto i = static_cast<Eigen::Index>(begin); i < static_cast<Eigen::Index>(end); ++i) {
+          if (constraints->is_held[i])
+            u.row(i) = constraints->targets.row(i);
+          else
+            u.row(i) += moved.row(i);
+        }
+      });
   lead = Lead::kTogether;
   return u;
 }
@@ -69,11 +72,12 @@ bool Deformer::Impl::is_good(const Points& led, const Points& other) {
   return objective.evaluate(led, even_norm()) <= most;
 }
 
-/// The same without another guess: its E^(1/2) at p = 2 is at most kLittleAbove times as high as that of the state before the move.
+/// The same without another guess: its E^(1/2) at p = 2 is at most kLittleAbove times as high as that of the state before the move. `objective` then
+/// holds its evaluation.
 bool Deformer::Impl::is_as_good_as_before(const Points& led) {
   if (!constraints->soft.empty()) return false;  // the state before has no such terms for the new targets
   const double most = kLittleAbove * kLittleAbove * best_energies.squaredNorm();
-  return objective.evaluate(led, even_norm()) * unit() * unit() <= most;
+  return is_guess_evaluated = objective.evaluate(led, even_norm()) * unit() * unit() <= most;
 }
 
 /// Begins with a led guess. If some p_i > 2, the weights of the move before differ so much that a step in their metric is cut short.
@@ -88,12 +92,31 @@ void Deformer::Impl::follow(const Points& guess) {
   if (make_coarse() && coarse->go_to(coarse_inputs(effective_material()), guess).ok()) lead = Lead::kTogether;
 }
 
+/// Whether each held vertex of `from` is where it is held.
+bool Deformer::Impl::is_at_targets(const Points& from) const {
+  for (Eigen::Index i = 0; i < from.rows(); ++i) {
+    if (constraints->is_held[i] && from.row(i) != constraints->targets.row(i)) return false;
+  }
+  return true;
+}
+
 /// Extrapolates a drag: if the handles move in about the same way as the last time, by the factor `share` of that move,
 /// the surface does the same. The remaining displacement of handles and soft targets is extended harmonically.
 Points Deformer::Impl::current_guess() {
+  Points forces = Points::Zero(x.rows(), 3);
+  const SoftTerms& before = objective.soft_terms();
+  if (constraints->soft.has_rows_of(before)) constraints->soft.add_pull(before, forces);
+  if (is_at_targets(x) && forces.isZero(0)) {
+    lead = Lead::kNone;  // the fine level goes on alone
+    x_before_move = x;
+    return x;
+  }
+  const bool can_lead = warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, bending);
+  std::optional<Points> led = can_lead ? led_guess() : std::nullopt;
   Points last = std::exchange(x_before_move, x);
+  if (led && is_as_good_as_before(*led)) return go_with(*std::move(led));
   last = last.rows() == x.rows() ? Points(x - last) : Points(Points::Zero(x.rows(), 3));
-  Points u = Points::Zero(x.rows(), 3), forces = u;
+  Points u = Points::Zero(x.rows(), 3);
   double along = 0, size = 0, left = 0, longest = 0;
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     if (!constraints->is_held[i]) continue;
@@ -103,15 +126,6 @@ Points Deformer::Impl::current_guess() {
     longest = std::max(longest, last.row(i).squaredNorm());
     left += u.row(i).squaredNorm();
   }
-  const SoftTerms& before = objective.soft_terms();
-  if (constraints->soft.has_rows_of(before)) constraints->soft.add_pull(before, forces);
-  if (left == 0 && forces.isZero(0)) {
-    lead = Lead::kNone;  // the fine level goes on alone
-    return x;
-  }
-  const bool can_lead = warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, bending);
-  std::optional<Points> led = can_lead ? led_guess() : std::nullopt;
-  if (led && is_as_good_as_before(*led)) return go_with(*std::move(led));
   const double share = size > 0 ? along / size : 0;
   const bool goes_on = share > 0 && share < kFarthestGuess && along * along > kSameWay * size * left &&
                        last.rowwise().squaredNorm().maxCoeff() < kSteady * longest;
@@ -131,6 +145,7 @@ Points Deformer::Impl::current_guess() {
 }
 
 Points Deformer::Impl::initial_guess(InitialGuess guess) {
+  is_guess_evaluated = false;
   Points result;
   if (guess == InitialGuess::kRest)
     result = constraints->targets;
@@ -138,6 +153,8 @@ Points Deformer::Impl::initial_guess(InitialGuess guess) {
     result = current_guess();
   else
     result = laplacian_guess();
+  if (is_guess_evaluated && constraints->linear.empty()) return result;
+  is_guess_evaluated = false;
   // Sets held vertices exactly to their targets, which removes the solve's rounding.
   for (Eigen::Index i = 0; i < result.rows(); ++i) {
     if (constraints->is_held[i]) result.row(i) = constraints->targets.row(i);

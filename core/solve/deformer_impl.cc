@@ -66,7 +66,7 @@ LpNorm Deformer::Impl::even_norm() const {
 
 /// The largest E_i or D_k at the guess. As the reference length, it keeps terms of any p in range.
 double Deformer::Impl::typical_energy(const Points& guess) {
-  objective.evaluate(guess, even_norm());
+  if (!is_guess_evaluated) objective.evaluate(guess, even_norm());
   const auto& e2 = objective.cells().squared_energies();
   const auto& d2 = objective.soft_terms().squared_distances();
   double largest = *std::max_element(e2.begin(), e2.end());

@@ -18,11 +18,11 @@ namespace lpdeform {
 /// The state of a Deformer, and the loop of a solve. Initial guesses are in deformer_guess.cc, the search for lower minima in
 /// deformer_search.cc, everything else in deformer_impl.cc.
 struct Deformer::Impl {
-  Impl(std::shared_ptr<const RestShape> rest_shape, DeformerOptions deformer_options, Metric first_metric,
-       std::optional<CoarseMesh> first_coarse_mesh)
+  Impl(std::shared_ptr<const RestShape> rest_shape, DeformerOptions deformer_options,
+       Objective first_objective, Metric first_metric, std::optional<CoarseMesh> first_coarse_mesh)
       : shape(std::move(rest_shape)),
         options(std::move(deformer_options)),
-        objective(shape, Workers(shape->vertex_count() < options.parallel_from ? 1 : options.threads)),
+        objective(std::move(first_objective)),
         metric(std::move(first_metric)),
         coarse_mesh(std::move(first_coarse_mesh)),
         x(shape->scaled_positions()),
@@ -41,6 +41,7 @@ struct Deformer::Impl {
   void follow(const Points& guess);
   bool is_good(const Points& led, const Points& other);
   bool is_as_good_as_before(const Points& led);
+  bool is_at_targets(const Points& from) const;
   Points go_with(Points led);
   FineInputs coarse_inputs(const Material& effective) const;
   SoftTerms guess_springs() const;
@@ -145,6 +146,7 @@ struct Deformer::Impl {
   // The running solve.
   SolveSettings settings;
   Warmth warmth = Warmth::kCold;
+  bool is_guess_evaluated = false;  // whether `objective` holds the evaluation of the last initial_guess()
   std::stop_token stop;
   std::optional<LpNorm> norm;           // true norm, and the reference of the running solve
   std::unique_ptr<CoarseLevel> coarse;  // made when first needed

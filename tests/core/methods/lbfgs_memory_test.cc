@@ -25,9 +25,11 @@ class LbfgsMemoryTest : public testing::TestWithParam<int> {
     g_before_.swap(g_);
     h_before_.swap(h_);
     g_ = hessian_.cwiseProduct(x_);
-    h_ = g_.cwiseQuotient(metric_);
+    h_ = g_.cwiseQuotient(metric_).cast<float>();
     return memory_.direction(g_, g_before_, h_, h_before_, length, d_);
   }
+
+  Points h() const { return h_.cast<double>(); }
 
   /// Makes a step and keeps its pair for the dense formula.
   void walk(double length) {
@@ -54,15 +56,16 @@ class LbfgsMemoryTest : public testing::TestWithParam<int> {
     return v;
   }
 
-  Points hessian_{kCount, 3}, metric_{kCount, 3}, x_{kCount, 3}, g_, g_before_, h_, h_before_, d_;
+  Points hessian_{kCount, 3}, metric_{kCount, 3}, x_{kCount, 3}, g_, g_before_, d_;
+  SinglePoints h_, h_before_;
   std::vector<Points> steps_, changes_;
   LbfgsMemory memory_{Workers(GetParam()), 3};
 };
 
 TEST_P(LbfgsMemoryTest, BeginsWithTheMetric) {
   const double slope = direction(0);
-  EXPECT_EQ(d_, -h_);
-  EXPECT_NEAR(slope, -g_.cwiseProduct(h_).sum(), 1e-9 * std::abs(slope));
+  EXPECT_EQ(d_, -h());
+  EXPECT_NEAR(slope, -g_.cwiseProduct(h()).sum(), 1e-9 * std::abs(slope));
 }
 
 TEST_P(LbfgsMemoryTest, IsTheTwoLoopRecursionOverTheLastPairs) {
@@ -82,7 +85,7 @@ TEST_P(LbfgsMemoryTest, LeavesOutAStepWithoutCurvature) {
   hessian_.setZero();
   walk(1);
   direction(1);
-  EXPECT_EQ(d_, -h_);
+  EXPECT_EQ(d_, -h());
 }
 
 TEST_P(LbfgsMemoryTest, ForgetsWhenCleared) {
@@ -91,8 +94,8 @@ TEST_P(LbfgsMemoryTest, ForgetsWhenCleared) {
   direction(0.9);
   memory_.clear();
   direction(0);
-  EXPECT_LT((d_ + h_).norm(), 0.9 * h_.norm());  // scaled by what was learnt, in the metric's direction
-  EXPECT_NEAR(d_.cwiseProduct(h_).sum(), -d_.norm() * h_.norm(), 1e-12 * d_.norm() * h_.norm());
+  EXPECT_LT((d_ + h()).norm(), 0.9 * h().norm());  // scaled by what was learnt, in the metric's direction
+  EXPECT_NEAR(d_.cwiseProduct(h()).sum(), -d_.norm() * h().norm(), 1e-12 * d_.norm() * h().norm());
 }
 
 TEST(LbfgsMemory, GivesTheSameBitsOnAnyNumberOfThreads) {
@@ -101,10 +104,11 @@ TEST(LbfgsMemory, GivesTheSameBitsOnAnyNumberOfThreads) {
     LbfgsMemory memory(Workers(threads), 2);
     const Points g0 = Points::Constant(kCount, 3, 1.25);
     Points d;
-    memory.direction(g0, g0, g0, g0, 0, d);
+    const SinglePoints h0 = g0.cast<float>();
+    memory.direction(g0, g0, h0, h0, 0, d);
     Points g1 = g0 / 3;
     for (Eigen::Index k = 0; k < g1.size(); ++k) g1.data()[k] += 1e-3 * std::sin(static_cast<double>(k));
-    memory.direction(g1, g0, g1, g0, 1, d);
+    memory.direction(g1, g0, g1.cast<float>(), h0, 1, d);
     results.push_back(d);
   }
   EXPECT_EQ(results[0], results[1]);
