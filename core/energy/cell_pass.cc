@@ -62,7 +62,7 @@ double CellPass::evaluate_cells(const Points& x, const LpNorm& norm, bool fit) {
       to[0] = from[0], to[1] = from[1], to[2] = from[2];
     }
   });
-  if (membrane_) membrane_->evaluate(x, workers_);
+  if (membrane_) membrane_->evaluate(rows_.data(), workers_);
   return sum_of_chunks([&](std::size_t begin, std::size_t end) {
     const std::size_t first = begin / kLanes, last = (end + kLanes - 1) / kLanes;
     evaluate_blocks(blocks_, first, last, rows_.data(), fit, state_);

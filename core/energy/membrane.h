@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/base/workers.h"
+#include "core/energy/membrane_kernel.h"
 #include "core/energy/rest_shape.h"
 
 namespace lpdeform {
@@ -20,8 +21,8 @@ class Membrane {
  public:
   Membrane(std::shared_ptr<const RestShape> shape, const Workers& workers);
 
-  /// All E_T^2 and their derivatives at x.
-  void evaluate(const Points& x, const Workers& workers);
+  /// All E_T^2 and their derivatives where the vertices are at `rows`: x, y, z and a filler for each.
+  void evaluate(const double* rows, const Workers& workers);
   /// A third of the sum of E_T^2 over the faces at vertex i.
   double share(std::int32_t i) const;
   /// Adds factor * sum_T (c_a + c_b + c_c) / 3 dE_T^2/dx to rows begin to end - 1 of `result`, (a, b, c) = T.
@@ -31,19 +32,8 @@ class Membrane {
   std::size_t memory_bytes() const;
 
  private:
-  struct Face {
-    double inverse[3];  // of the rest edges in the face's plane, upper triangular: 00, 01, 11
-    double area;
-  };
-  struct Derivative {
-    double of[2][3];  // dE_T^2 by the second and third corner
-  };
-  void evaluate(const Points& x, std::size_t face);
-
   std::shared_ptr<const RestShape> shape_;
-  std::vector<Face> faces_;
-  std::vector<double> squared_;
-  std::vector<Derivative> derivatives_;
+  MembraneFaces faces_;
   std::vector<std::int32_t> offsets_, corners_;  // of each vertex: 3 * face + corner
 };
 

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
+#include <vector>
 
 #include "core/energy/cell_pass.h"
 #include "tests/core/poses.h"
@@ -26,6 +27,13 @@ Points rolled(const RestShape& shape, double radius) {
   return x;
 }
 
+/// As Membrane takes them: x, y, z and a filler for each vertex.
+std::vector<double> with_fillers(const Points& x) {
+  std::vector<double> rows;
+  for (Eigen::Index i = 0; i < x.rows(); ++i) rows.insert(rows.end(), {x(i, 0), x(i, 1), x(i, 2), 0});
+  return rows;
+}
+
 double sum_of_shares(const Membrane& membrane, std::int32_t n) {
   double sum = 0;
   for (std::int32_t i = 0; i < n; ++i) sum += membrane.share(i);
@@ -37,7 +45,7 @@ TEST(Membrane, IsWhatTheBestRotationOfEachFaceLeaves) {
   const Points& rest = shape->scaled_positions();
   const Points x = shaken(rest, 0.3);
   Membrane membrane(shape, Workers(1));
-  membrane.evaluate(x, Workers(1));
+  membrane.evaluate(with_fillers(x).data(), Workers(1));
   double expected = 0;
   for (Eigen::Index t = 0; t < shape->faces().rows(); ++t) {
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
@@ -64,7 +72,7 @@ TEST(Membrane, ResistsStretchingAsCellsDo) {
   Points x = shape->scaled_positions();
   x.col(1) *= 1.3;
   Membrane membrane(shape, Workers(1));
-  membrane.evaluate(x, Workers(1));
+  membrane.evaluate(with_fillers(x).data(), Workers(1));
   CellPass cells(shape, Workers(1));
   const double expected = cells.evaluate(x, two(shape->vertex_count()));
   EXPECT_NEAR(sum_of_shares(membrane, shape->vertex_count()) / expected, 1,
@@ -75,7 +83,7 @@ TEST(Membrane, DoesNotResistBending) {
   const auto shape = rest_shape(grid(20, 20));
   const Points x = rolled(*shape, 20);
   Membrane membrane(shape, Workers(1));
-  membrane.evaluate(x, Workers(1));
+  membrane.evaluate(with_fillers(x).data(), Workers(1));
   CellPass cells(shape, Workers(1));
   const double cell = cells.evaluate(x, two(shape->vertex_count()));
   EXPECT_LT(sum_of_shares(membrane, shape->vertex_count()), 0.01 * cell);  // chords are shorter than arcs
