@@ -103,14 +103,20 @@ absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const Triangl
   EdgeWeights edges;
   const bool is_at_once =
       workers.threads() > 1 && kind != WeightKind::kIntrinsicDelaunay && has_weights(mesh);
+  const auto shape = std::shared_ptr<RestShape>(new RestShape);
+  const auto find_edges = [&] {
+    edges = edge_weights(mesh, kind);
+    make_rows(static_cast<std::int32_t>(mesh.vertices.rows()), edges, shape->offsets_, shape->neighbours_,
+              shape->weights_);
+  };
   workers.run_both([&] { report = check_mesh(mesh); },
                    [&] {
-                     if (is_at_once) edges = edge_weights(mesh, kind);
+                     if (!is_at_once) return;
+                     find_edges();
+                     shape->components_ = connected_components(mesh);
                    });
   if (absl::Status status = deformable(report); !status.ok()) return status;
-
-  const auto shape = std::shared_ptr<RestShape>(new RestShape);
-  shape->components_ = connected_components(mesh);
+  if (!is_at_once) shape->components_ = connected_components(mesh);
   const Extent extent = extent_of(mesh.vertices, shape->components_);
   if (absl::Status status = check_scale(extent); !status.ok()) return status;
   shape->positions_ = mesh.vertices;
@@ -118,10 +124,9 @@ absl::StatusOr<std::shared_ptr<const RestShape>> RestShape::create(const Triangl
   shape->kind_ = kind;
   shape->component_count_ = static_cast<std::int32_t>(report.components);
 
-  if (!is_at_once) edges = edge_weights(mesh, kind);
+  if (!is_at_once) find_edges();
   count_weight_defects(edges, report);
   shape->report_ = std::move(report);
-  make_rows(shape->vertex_count(), edges, shape->offsets_, shape->neighbours_, shape->weights_);
 
   shape->mean_edge_length_ = mean_length(mesh, edges);
   shape->diagonal_ = (extent.high - extent.low).norm();
