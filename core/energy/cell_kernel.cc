@@ -53,10 +53,6 @@ struct FitSums {
   V moved_size;  // sum_j w_ij |x_i - x_j|^2
 };
 
-HWY_INLINE Vector difference(const Vector& a, const Vector& b) {
-  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-}
-
 constexpr std::size_t kEdge =
     6 * kLanes;  // numbers of a slot in the buffer of edges: x_i - x_j, then p_i - p_j
 

@@ -37,6 +37,10 @@ HWY_INLINE V dot(const Vector& a, const Vector& b) {
   return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
 
+HWY_INLINE Vector difference(const Vector& a, const Vector& b) {
+  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+
 HWY_INLINE Vector times(const Matrix& a, const Vector& v) {
   const auto row = [&](int r) {
     return hn::MulAdd(a.m[r][0], v.x, hn::MulAdd(a.m[r][1], v.y, hn::Mul(a.m[r][2], v.z)));

@@ -21,7 +21,8 @@ using SinglePoints = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
 /// the residuals, which is (p - 1) times as large, so full steps would be too long. Where rotations follow a step, it
 /// overestimates the curvature, so full steps would be about half as long as they should be. clear() keeps gamma.
 ///
-/// Each iteration makes only two passes over all vectors. Pairs and h are in single precision, since they only affect the search direction. Runs in parallel in fixed chunks, which gives the same bits on any number of threads. One
+/// Each iteration makes only two passes over all vectors. Pairs and h are in single precision, since they only affect
+/// the search direction. Runs in parallel in fixed chunks, which gives the same bits on any number of threads. One
 /// caller at a time.
 class LbfgsMemory {
  public:

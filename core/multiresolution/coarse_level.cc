@@ -162,31 +162,27 @@ absl::Status CoarseLevel::go_to(const FineInputs& fine, const Points& x) {
 
 CoarseLevel::Pose CoarseLevel::rest_pose(const RestShape& fine) const {
   Pose rest{Points(static_cast<Eigen::Index>(fine_vertex_.size()), 3),
-            std::vector<Turn>(fine_vertex_.size(), Turn::Identity())};
+            std::vector<Eigen::Matrix3d>(fine_vertex_.size(), Eigen::Matrix3d::Identity())};
   for (std::size_t c = 0; c < fine_vertex_.size(); ++c)
     rest.positions.row(static_cast<Eigen::Index>(c)) = fine.scaled_positions().row(fine_vertex_[c]);
   return rest;
 }
 
 CoarseLevel::Pose CoarseLevel::pose(const RestShape& fine) const {
-  Pose now{(solver_->positions().rowwise() - fine.centre()) / fine.mean_edge_length(), {}};
-  now.rotations.reserve(fine_vertex_.size());
-  for (const Eigen::Matrix3d& rotation : solver_->rotations())
-    now.rotations.push_back(rotation.cast<float>());
-  return now;
+  return {(solver_->positions().rowwise() - fine.centre()) / fine.mean_edge_length(), solver_->rotations()};
 }
 
 /// The fine surface `from`, moved as its guides have moved from one coarse state to another. With `turns`, writes them too.
 Points CoarseLevel::carried(const Points& from, const Pose& before, const Pose& now, const Workers& workers,
                             std::vector<Turn>* turns) const {
   // A row vector d becomes d M.topRows<3>() + M.row(3).
-  using RigidMotion = Eigen::Matrix<double, 4, 3, Eigen::RowMajor>;
-  std::vector<RigidMotion> coarse_motions(fine_vertex_.size());
+  using AffineMotion = Eigen::Matrix<double, 4, 3, Eigen::RowMajor>;
+  std::vector<AffineMotion> coarse_motions(fine_vertex_.size());
   workers.for_chunks(coarse_motions.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t c = begin; c < end; ++c) {
       const auto row = static_cast<Eigen::Index>(c);
-      RigidMotion& motion = coarse_motions[c];
-      motion.topRows<3>() = before.rotations[c].cast<double>() * now.rotations[c].cast<double>().transpose();
+      AffineMotion& motion = coarse_motions[c];
+      motion.topRows<3>() = before.rotations[c] * now.rotations[c].transpose();
       motion.row(3) = now.positions.row(row) - before.positions.row(row) * motion.topRows<3>();
     }
   });
@@ -196,7 +192,7 @@ Points CoarseLevel::carried(const Points& from, const Pose& before, const Pose& 
     const auto row = static_cast<Eigen::Index>(v);
     const Guides& guides = guides_[v];
     double sum = 0;
-    RigidMotion motion = RigidMotion::Zero();
+    AffineMotion motion = AffineMotion::Zero();
     for (std::size_t k = 0; k < kGuides; ++k) {
       motion += guides.weight[k] * coarse_motions[guides.vertex[k]];
       sum += guides.weight[k];

@@ -84,10 +84,10 @@ class CoarseLevel {
   /// A coarse state: positions in scaled units of the fine shape, and the fitted rotations of the cells.
   struct Pose {
     Points positions;
-    std::vector<Turn> rotations;
+    std::vector<Eigen::Matrix3d> rotations;
 
     std::size_t memory_bytes() const {
-      return positions.size() * sizeof(double) + rotations.capacity() * sizeof(Turn);
+      return positions.size() * sizeof(double) + rotations.capacity() * sizeof(Eigen::Matrix3d);
     }
   };
 
@@ -104,7 +104,7 @@ class CoarseLevel {
   static constexpr std::size_t kGuides = 4;
   struct Guides {
     std::array<std::int32_t, kGuides> vertex;  // coarse
-    std::array<float, kGuides> weight;         // weights add up to 1
+    std::array<float, kGuides> weight;         // they add up to 1, to single precision
   };
   std::vector<std::int32_t> fine_vertex_, coarse_vertex_;  // see CoarseMesh
   std::vector<double> share_;                              // the number of fine vertices of each coarse one

@@ -72,8 +72,8 @@ bool Deformer::Impl::is_good(const Points& led, const Points& other) {
   return objective.evaluate(led, even_norm()) <= most;
 }
 
-/// The same without another guess: its E^(1/2) at p = 2 is at most kLittleAbove times as high as that of the state before the move. `objective` then
-/// holds its evaluation.
+/// The same without another guess: its E^(1/2) at p = 2 is at most kLittleAbove times as high as that of the state before the move.
+/// `objective` then holds its evaluation.
 bool Deformer::Impl::is_as_good_as_before(const Points& led) {
   if (!constraints->soft.empty()) return false;  // the state before has no such terms for the new targets
   const double most = kLittleAbove * kLittleAbove * best_energies.squaredNorm();
@@ -138,7 +138,11 @@ Points Deformer::Impl::current_guess() {
   metric.extend(constraints->is_held, u, workers(), &forces);
   if (goes_on) u += share * last;
   Points guess = x + u;
-  if (!can_lead || !guess.allFinite()) return guess;
+  if (!can_lead) return guess;
+  if (!guess.allFinite()) {
+    lead = Lead::kNone;
+    return guess;
+  }
   if (led && is_good(*led, guess)) return go_with(*std::move(led));
   follow(guess);
   return guess;

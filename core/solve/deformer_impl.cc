@@ -298,8 +298,10 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   summary.setup_seconds = seconds();
 
   started = Clock::now();
+  is_guess_evaluated = false;
   Points guess = is_factored ? initial_guess(settings.initial) : constraints->targets;
   if (!guess.allFinite()) {
+    is_guess_evaluated = false;
     guess = constraints->targets;
     constraints->linear.satisfy(guess);
   }
