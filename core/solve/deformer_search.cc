@@ -12,6 +12,7 @@
 namespace lpdeform {
 namespace {
 
+constexpr int kEffortOfLevel = 2;            // times the effort: starts of a coarse level take less time
 constexpr std::int32_t kSmallestMesh = 100;  // vertices; smaller ones have few minima
 constexpr double kWork = 2e7;                // iterations times vertices of a start, at most
 
@@ -148,7 +149,8 @@ bool Deformer::Impl::is_by_coarse_levels(int start) const {
 std::unique_ptr<Minimiser> Deformer::Impl::make_coarse_start(const Points& guess) {
   if (!prepare_coarse()) return nullptr;
   objective.evaluate(guess, *norm);
-  return std::make_unique<Multiresolution>(make_problem(), guess, *coarse, *settings.effort);
+  const int effort = std::min(kEffortOfLevel * *settings.effort, SolveSettings::kHighestEffort);
+  return std::make_unique<Multiresolution>(make_problem(), guess, *coarse, effort);
 }
 
 void Deformer::Impl::begin_search(int starts) {
