@@ -47,6 +47,7 @@ it("handles that are selected together are dragged together, in one step, and Es
   await user.page.locator("canvas.stage").focus();
   await press("Control+z");
   expect((await handles()).get("Head")!.translation).toEqual([0, 0, 0]);
+  await user.settled(); // else the vertex is not where the mouse comes down
 
   const { mouse } = user.page;
   const again = await user.vertexOnPage(vertex);
