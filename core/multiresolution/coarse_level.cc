@@ -11,9 +11,9 @@ namespace {
 
 constexpr std::size_t kChunk = 4096;  // vertices
 
-/// A level that leads makes kLeadingWork / vertices iterations for a move, within these bounds.
-constexpr std::int32_t kLeadingWork = 70000;
-constexpr std::int32_t kLeastLeading = 4, kMostLeading = 100;
+/// For a move, the lowest level makes at most kMostLeading iterations; those above it kLeadingWork / vertices, but at least kLeastLeading.
+constexpr std::int32_t kLeadingWork = 22000;
+constexpr std::int32_t kLeastLeading = 3, kMostLeading = 100;
 constexpr double kLeadingTolerance = 1e-3;
 
 /// The field at the coarse vertices; a single value stays a single value.
@@ -136,7 +136,8 @@ std::optional<CoarseMotion> CoarseLevel::lead(const FineInputs& fine, const Poin
   settings.tolerance = kLeadingTolerance;
   settings.effort = 0;
   settings.keep_trace = false;
-  settings.max_iterations = std::clamp(kLeadingWork / shape_->vertex_count(), kLeastLeading, kMostLeading);
+  settings.max_iterations =
+      has_level_below() ? std::max(kLeadingWork / shape_->vertex_count(), kLeastLeading) : kMostLeading;
   if (!solver_->start(settings, std::move(stop)).ok()) return std::nullopt;
   while (solver_->step()) {
   }
