@@ -11,9 +11,13 @@ namespace {
 
 constexpr std::size_t kChunk = 4096;  // vertices
 
-/// For a move, the lowest level makes at most kMostLeading iterations; those above it kLeadingWork / vertices, but at least kLeastLeading.
-constexpr std::int32_t kLeadingWork = 22000;
-constexpr std::int32_t kLeastLeading = 3, kMostLeading = 100;
+/// For a move, a level makes work / vertices iterations, but at least `least` and at most kMostLeading. If no p_i is above 2, the lowest
+/// level makes kMostLeading.
+struct Leading {
+  std::int32_t work, least;
+};
+constexpr Leading kLeading = {22000, 3}, kLeadingAtLargeP = {70000, 4};
+constexpr std::int32_t kMostLeading = 100;
 constexpr double kLeadingTolerance = 1e-3;
 
 /// The field at the coarse vertices; a single value stays a single value.
@@ -112,6 +116,7 @@ absl::Status CoarseLevel::restrict_inputs(const FineInputs& fine) {
 
 absl::Status CoarseLevel::take_over(const FineInputs& fine) {
   led_to_.reset();
+  alone_from_.reset();
   solver_->set_bending(fine.bending);
   return restrict_inputs(fine);
 }
@@ -123,6 +128,8 @@ bool CoarseLevel::can_lead(const RestShape& fine, double bending) {
 
 std::optional<CoarseMotion> CoarseLevel::lead(const FineInputs& fine, const Points* from,
                                               const Workers& workers, std::stop_token stop) {
+  if (from && alone_from_ && !catch_up(fine, *from)) return std::nullopt;
+  alone_from_.reset();
   std::optional<Pose> before = std::exchange(led_to_, {});
   if (!from)
     before = rest_pose(fine.shape);
@@ -130,17 +137,7 @@ std::optional<CoarseMotion> CoarseLevel::lead(const FineInputs& fine, const Poin
     before = pose(fine.shape);
   if (!restrict_inputs(fine).ok()) return std::nullopt;
   bend_like_fine();
-  SolveSettings settings;
-  settings.initial = InitialGuess::kCurrent;
-  settings.method = Method::kQuasiNewton;
-  settings.tolerance = kLeadingTolerance;
-  settings.effort = 0;
-  settings.keep_trace = false;
-  settings.max_iterations =
-      has_level_below() ? std::max(kLeadingWork / shape_->vertex_count(), kLeastLeading) : kMostLeading;
-  if (!solver_->start(settings, std::move(stop)).ok()) return std::nullopt;
-  while (solver_->step()) {
-  }
+  if (!go_to_handles(most_iterations(fine.material), std::move(stop))) return std::nullopt;
   led_to_ = pose(fine.shape);
   CoarseMotion motion;
   motion.positions =
@@ -148,25 +145,74 @@ std::optional<CoarseMotion> CoarseLevel::lead(const FineInputs& fine, const Poin
   return motion;
 }
 
+std::optional<double> CoarseLevel::least_energy(const FineInputs& fine, std::stop_token stop) {
+  if (!led_to_ && !has_level_below()) led_to_ = pose(fine.shape);
+  if (!restrict_inputs(fine).ok()) return std::nullopt;
+  bend_like_fine();
+  if (has_level_below()) return solver_->least_energy(std::move(stop));
+  if (!go_to_handles(kMostLeading, std::move(stop))) return std::nullopt;
+  return solver_->cell_energies().norm();
+}
+
+int CoarseLevel::most_iterations(const Material& material) const {
+  const bool is_large_p = material.p.maxCoeff() > 2;
+  if (!is_large_p && !has_level_below()) return kMostLeading;
+  const Leading leading = is_large_p ? kLeadingAtLargeP : kLeading;
+  return std::clamp(leading.work / shape_->vertex_count(), leading.least, kMostLeading);
+}
+
+bool CoarseLevel::go_to_handles(int most_iterations, std::stop_token stop) {
+  SolveSettings settings;
+  settings.initial = InitialGuess::kCurrent;
+  settings.method = Method::kQuasiNewton;
+  settings.tolerance = kLeadingTolerance;
+  settings.effort = 0;
+  settings.keep_trace = false;
+  settings.max_iterations = most_iterations;
+  if (!solver_->start(settings, std::move(stop)).ok()) return false;
+  while (solver_->step()) {
+  }
+  return true;
+}
+
+void CoarseLevel::go_alone(const Points& x) {
+  if (!alone_from_) alone_from_ = at_coarse_vertices(x);
+}
+
+/// Moves the coarse levels as the fine level, which is at `x` now, has moved since go_alone().
+bool CoarseLevel::catch_up(const FineInputs& fine, const Points& x) {
+  const Points by = at_coarse_vertices(x) - *alone_from_;
+  const double unit = fine.shape.mean_edge_length();
+  if (has_level_below()) {
+    solver_->displace(unit * by);
+  } else {
+    const Points from = led_to_ ? led_to_->positions : pose(fine.shape).positions;
+    if (!solver_->set_positions((unit * (from + by)).rowwise() + fine.shape.centre()).ok()) return false;
+  }
+  led_to_.reset();
+  return true;
+}
+
 absl::Status CoarseLevel::go_to(const FineInputs& fine, const Points& x) {
   led_to_.reset();
+  alone_from_.reset();
   absl::Status status = restrict_inputs(fine);
   bend_like_fine();
-  Points positions(static_cast<Eigen::Index>(fine_vertex_.size()), 3);
-  for (std::size_t c = 0; c < fine_vertex_.size(); ++c) {
-    positions.row(static_cast<Eigen::Index>(c)) =
-        x.row(fine_vertex_[c]) * fine.shape.mean_edge_length() + fine.shape.centre();
-  }
-  status.Update(solver_->set_positions(positions));
+  status.Update(solver_->set_positions((at_coarse_vertices(x) * fine.shape.mean_edge_length()).rowwise() +
+                                       fine.shape.centre()));
   return status;
 }
 
-CoarseLevel::Pose CoarseLevel::rest_pose(const RestShape& fine) const {
-  Pose rest{Points(static_cast<Eigen::Index>(fine_vertex_.size()), 3),
-            std::vector<Eigen::Matrix3d>(fine_vertex_.size(), Eigen::Matrix3d::Identity())};
+Points CoarseLevel::at_coarse_vertices(const Points& x) const {
+  Points result(static_cast<Eigen::Index>(fine_vertex_.size()), 3);
   for (std::size_t c = 0; c < fine_vertex_.size(); ++c)
-    rest.positions.row(static_cast<Eigen::Index>(c)) = fine.scaled_positions().row(fine_vertex_[c]);
-  return rest;
+    result.row(static_cast<Eigen::Index>(c)) = x.row(fine_vertex_[c]);
+  return result;
+}
+
+CoarseLevel::Pose CoarseLevel::rest_pose(const RestShape& fine) const {
+  return {at_coarse_vertices(fine.scaled_positions()),
+          std::vector<Eigen::Matrix3d>(fine_vertex_.size(), Eigen::Matrix3d::Identity())};
 }
 
 CoarseLevel::Pose CoarseLevel::pose(const RestShape& fine) const {
@@ -225,7 +271,8 @@ void CoarseLevel::bend_like_fine() {
 std::size_t CoarseLevel::memory_bytes() const {
   return (fine_vertex_.capacity() + coarse_vertex_.capacity()) * sizeof(std::int32_t) +
          share_.capacity() * sizeof(double) + guides_.capacity() * sizeof(Guides) + shape_->memory_bytes() +
-         solver_->memory_bytes() + (led_to_ ? led_to_->memory_bytes() : 0);
+         solver_->memory_bytes() + (led_to_ ? led_to_->memory_bytes() : 0) +
+         (alone_from_ ? alone_from_->size() * sizeof(double) : 0);
 }
 
 }  // namespace lpdeform

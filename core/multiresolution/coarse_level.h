@@ -58,6 +58,13 @@ class CoarseLevel {
   /// not take the inputs. Only if can_lead().
   std::optional<CoarseMotion> lead(const FineInputs& fine, const Points* from, const Workers& workers,
                                    std::stop_token stop);
+  /// Takes the inputs over like lead(), and lets only the lowest level go to them. Returns the root of the sum of its E_i^2, in the
+  /// caller's units: about what the fine level's minimum has. The levels above stay where they are. nullopt if a level does
+  /// not take the inputs.
+  std::optional<double> least_energy(const FineInputs& fine, std::stop_token stop);
+  /// The fine level, which is at `x` (scaled units), goes on alone. The next lead() first moves the coarse levels as it has moved
+  /// by then.
+  void go_alone(const Points& x);
   /// Takes the inputs over like lead(), and the fine state x (scaled units) as the state of the coarse solver.
   absl::Status go_to(const FineInputs& fine, const Points& x);
 
@@ -94,6 +101,10 @@ class CoarseLevel {
   CoarseLevel() = default;
   void find_guides(const RestShape& fine);
   absl::Status restrict_inputs(const FineInputs& fine);
+  Points at_coarse_vertices(const Points& x) const;
+  bool catch_up(const FineInputs& fine, const Points& x);
+  int most_iterations(const Material& material) const;
+  bool go_to_handles(int most_iterations, std::stop_token stop);
   Pose rest_pose(const RestShape& fine) const;
   Pose pose(const RestShape& fine) const;
   Points carried(const Points& from, const Pose& before, const Pose& now, const Workers& workers,
@@ -112,7 +123,9 @@ class CoarseLevel {
   std::shared_ptr<const RestShape> shape_;
   double bending_ = 1;  // of the fine level
   std::unique_ptr<LevelSolver> solver_;
-  std::optional<Pose> led_to_;  // the solver's state, where lead() has come to it
+  std::optional<Pose>
+      led_to_;  // the solver's state, where lead() has come to it; the lowest level may have gone on
+  std::optional<Points> alone_from_;  // of the coarse vertices, where the fine level has begun to go alone
 };
 
 }  // namespace lpdeform

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stop_token>
 
 #include "absl/status/status.h"
@@ -20,6 +21,8 @@ class LevelSolver {
 
   virtual absl::Status set_material(const Material& material) = 0;
   virtual void set_bending(double share) = 0;
+  virtual void displace(const Points& by) = 0;
+  virtual std::optional<double> least_energy(std::stop_token stop) = 0;
   virtual absl::Status set_handles(const HandleSet& handles) = 0;
   virtual absl::Status set_positions(const Points& positions) = 0;
   virtual absl::Status start(const SolveSettings& settings, std::stop_token stop) = 0;
@@ -29,6 +32,7 @@ class LevelSolver {
   /// Whether the last solve's search has found a minimum lower than its first, and has taken it (SolveSettings::effort).
   virtual bool has_found_lower() const = 0;
   virtual const Points& positions() const = 0;
+  virtual const Field& cell_energies() const = 0;
   virtual std::vector<Eigen::Matrix3d> rotations() = 0;
   /// Between its solves: it does not run while the finer level does.
   virtual std::size_t memory_bytes() const = 0;

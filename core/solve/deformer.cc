@@ -136,6 +136,20 @@ absl::Status Deformer::set_positions(const Points& positions) {
   return absl::OkStatus();
 }
 
+void Deformer::displace(const Points& by) {
+  Impl& self = *impl_;
+  if (self.lead == Impl::Lead::kTogether) self.coarse->go_alone(self.x);
+  self.x += by / self.unit();
+  self.is_positions_current = false;
+  self.x_before_move.resize(0, 3);
+}
+
+std::optional<double> Deformer::least_energy(std::stop_token stop) {
+  Impl& self = *impl_;
+  if (!self.constraints || !self.make_coarse()) return std::nullopt;
+  return self.coarse->least_energy(self.coarse_inputs(self.effective_material()), std::move(stop));
+}
+
 absl::Status Deformer::start(const SolveSettings& settings, std::stop_token stop) {
   Impl& self = *impl_;
   if (absl::Status status = check_settings(settings, self.material); !status.ok()) return status;

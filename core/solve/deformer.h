@@ -69,6 +69,12 @@ class Deformer {
   /// Ends a running solve with kCancelled.
   absl::Status set_positions(const Points& positions);
 
+  /// Only for coarse levels: moves the current state by `by`, in the caller's units, and the levels below it in the same way. Not
+  /// during a solve.
+  void displace(const Points& by);
+  /// Only for coarse levels: CoarseLevel::least_energy() of the level below. nullopt if there is none.
+  std::optional<double> least_energy(std::stop_token stop);
+
   /// Begins a solve. Errors: FAILED_PRECONDITION (NO_HANDLES); INVALID_ARGUMENT (METHOD_NEEDS_P,
   /// METHOD_NEEDS_EXACT_HANDLES, TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE). `stop` is
   /// checked in every iteration.

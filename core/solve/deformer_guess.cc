@@ -12,8 +12,11 @@ constexpr double kFarthestGuess = 2;  // the guess continues the last move by le
 constexpr double kSameWay = 0.5;      // two moves count as one drag above this squared cosine between them
 // In such a drag, the squared ratio of the surface's largest move to the handles' largest move is below this.
 constexpr double kSteady = 9;
-constexpr double kMostAbove = 2;      // see is_good
-constexpr double kLittleAbove = 1.2;  // see is_as_good_as_before
+constexpr double kMostAbove = 2;        // see is_good
+constexpr double kLittleAbove = 1.2;    // see is_as_good_as_before
+constexpr double kMostOverLeast = 1.8;  // see guess_alone
+// Moves that coarse levels lead after guess_alone has refused, and where there was no time for an iteration after it.
+constexpr int kMovesToLead = 3, kMovesToLeadWithoutTime = 12;
 
 }  // namespace
 
@@ -100,22 +103,12 @@ bool Deformer::Impl::is_at_targets(const Points& from) const {
   return true;
 }
 
-/// Extrapolates a drag: if the handles move in about the same way as the last time, by the factor `share` of that move,
-/// the surface does the same. The remaining displacement of handles and soft targets is extended harmonically.
-Points Deformer::Impl::current_guess() {
-  Points forces = Points::Zero(x.rows(), 3);
-  const SoftTerms& before = objective.soft_terms();
-  if (constraints->soft.has_rows_of(before)) constraints->soft.add_pull(before, forces);
-  if (is_at_targets(x) && forces.isZero(0)) {
-    lead = Lead::kNone;  // the fine level goes on alone
-    x_before_move = x;
-    return x;
-  }
-  const bool can_lead = warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, bending);
-  std::optional<Points> led = can_lead ? led_guess() : std::nullopt;
-  Points last = std::exchange(x_before_move, x);
-  if (led && is_as_good_as_before(*led)) return go_with(*std::move(led));
-  last = last.rows() == x.rows() ? Points(x - last) : Points(Points::Zero(x.rows(), 3));
+/// Extrapolates a drag from x: if the handles move in about the same way as in the last move, by the factor `share` of that move,
+/// the surface does the same. The remaining displacement of handles and soft targets is extended harmonically. `forces` are
+/// those of soft targets.
+Points Deformer::Impl::continued(Points forces) const {
+  const Points last =
+      x_before_move.rows() == x.rows() ? Points(x - x_before_move) : Points(Points::Zero(x.rows(), 3));
   Points u = Points::Zero(x.rows(), 3);
   double along = 0, size = 0, left = 0, longest = 0;
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
@@ -137,7 +130,63 @@ Points Deformer::Impl::current_guess() {
   }
   metric.extend(constraints->is_held, u, workers(), &forces);
   if (goes_on) u += share * last;
-  Points guess = x + u;
+  return x + u;
+}
+
+/// The guess of a drag that the coarse levels do not lead. It takes half of the time. nullopt if it is not good enough: if its E^(1/2)
+/// is too far above that of the lowest level, which tells about what the minimum has.
+std::optional<Points> Deformer::Impl::guess_alone() {
+  std::optional<double> least;
+  Points guess;
+  workers().run_both([&] { least = coarse->least_energy(coarse_inputs(effective_material()), stop); },
+                     [&] {
+                       guess = continued(Points::Zero(x.rows(), 3));
+                       for (Eigen::Index i = 0; i < x.rows(); ++i) {
+                         if (constraints->is_held[i]) guess.row(i) = constraints->targets.row(i);
+                       }
+                     });
+  if (!least || !guess.allFinite()) return std::nullopt;
+  const double most = kMostOverLeast * *least / unit();
+  if (!(objective.evaluate(guess, even_norm()) <= most * most)) return std::nullopt;
+  is_guess_evaluated = true;
+  return guess;
+}
+
+/// Whether guess_alone() may be tried. At another p than 2, or with soft targets, E^(1/2) does not tell how good a guess is.
+bool Deformer::Impl::can_go_alone() const {
+  return !is_coarse() && lead == Lead::kTogether && (material.p.array() == 2).all() &&
+         constraints->soft.empty() && constraints->linear.empty();
+}
+
+/// The guess of a solve that goes on from x: by the fine level alone, where that is good enough, or led by the coarse levels.
+Points Deformer::Impl::current_guess() {
+  Points forces = Points::Zero(x.rows(), 3);
+  const SoftTerms& before = objective.soft_terms();
+  if (constraints->soft.has_rows_of(before)) constraints->soft.add_pull(before, forces);
+  if (is_at_targets(x) && forces.isZero(0)) {
+    lead = Lead::kNone;  // the fine level goes on alone
+    x_before_move = x;
+    return x;
+  }
+  const bool can_lead = warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, bending);
+  const bool had_no_time = std::exchange(goes_alone, false) && fine_iterations == 0;
+  if (had_no_time) moves_to_lead = kMovesToLeadWithoutTime;
+  if (can_lead && can_go_alone() && moves_to_lead-- <= 0) {
+    if (std::optional<Points> alone = guess_alone()) {
+      coarse->go_alone(x);
+      x_before_move = x;
+      goes_alone = true;
+      return *std::move(alone);
+    }
+    moves_to_lead = kMovesToLead;
+  }
+  std::optional<Points> led = can_lead ? led_guess() : std::nullopt;
+  if (led && is_as_good_as_before(*led)) {
+    x_before_move = x;
+    return go_with(*std::move(led));
+  }
+  Points guess = continued(std::move(forces));
+  x_before_move = x;
   if (!can_lead) return guess;
   if (!guess.allFinite()) {
     lead = Lead::kNone;

@@ -32,6 +32,10 @@ class DeformerOfLevel : public LevelSolver {
   explicit DeformerOfLevel(std::unique_ptr<Deformer> deformer) : deformer_(std::move(deformer)) {}
 
   void set_bending(double share) override { deformer_->set_bending(share); }
+  void displace(const Points& by) override { deformer_->displace(by); }
+  std::optional<double> least_energy(std::stop_token stop) override {
+    return deformer_->least_energy(std::move(stop));
+  }
   absl::Status set_material(const Material& material) override { return deformer_->set_material(material); }
   absl::Status set_handles(const HandleSet& handles) override { return deformer_->set_handles(handles); }
   absl::Status set_positions(const Points& positions) override { return deformer_->set_positions(positions); }
@@ -46,6 +50,7 @@ class DeformerOfLevel : public LevelSolver {
     return !summary.minima.empty() && summary.energy < summary.minima.front();
   }
   const Points& positions() const override { return deformer_->positions(); }
+  const Field& cell_energies() const override { return deformer_->cell_energies(); }
   std::vector<Eigen::Matrix3d> rotations() override { return deformer_->rotations(); }
   std::size_t memory_bytes() const override { return deformer_->idle_memory_bytes(); }
 

@@ -36,6 +36,9 @@ struct Deformer::Impl {
   double length_unit() const { return material.length_unit > 0 ? material.length_unit : unit(); }
 
   Points laplacian_guess();
+  Points continued(Points forces) const;
+  std::optional<Points> guess_alone();
+  bool can_go_alone() const;
   Points current_guess();
   std::optional<Points> led_guess();
   void follow(const Points& guess);
@@ -157,6 +160,8 @@ struct Deformer::Impl {
     kTogether,  // it is for the same inputs, and has come as far as x
   };
   Lead lead = Lead::kNone;
+  bool goes_alone = false;  // the guess of the running or the last solve is that of guess_alone()
+  int moves_to_lead = 0;    // by the coarse levels, before guess_alone() is tried again
   std::unique_ptr<Minimiser> minimiser;
   int fine_iterations = 0;                   // of the running solve
   std::unique_ptr<MinimaSearch> search;      // runs after the minimiser has ended

@@ -25,6 +25,7 @@ class LedDragTest : public testing::TestWithParam<double> {
   }
   static SolveSummary solve(Deformer& deformer, int max_iterations) {
     SolveSettings settings{.max_iterations = max_iterations, .effort = 0};
+    settings.keep_trace = true;
     return deformer.solve(settings).value();
   }
   SolveSummary move(int number, int max_iterations = 1) const {
@@ -76,13 +77,15 @@ INSTANTIATE_TEST_SUITE_P(Norms, LedDragTest, testing::Values(1.5, 2.0, 6.0));
 
 class LedDragOfLowPTest : public LedDragTest {};
 
-/// The ratio was 1.33 and 1.20 when a coarse level did not lead the move after one of a dozen fine iterations.
-TEST_P(LedDragOfLowPTest, BeginsNearTheMinimumWhereMovesHaveTime) {
+/// At p = 2 the fine level goes on alone; its guess and two iterations take as long as a guess that coarse levels lead. At p = 1.5 the
+/// ratio was 1.33 when a coarse level did not lead the move after one of a dozen fine iterations.
+TEST_P(LedDragOfLowPTest, IsSoonNearTheMinimumWhereMovesHaveTime) {
+  const int soon = GetParam() == 2 ? 2 : 0;
   for (int number = 1; number < 10; ++number) (void)move(number, 20);
   double most = 0;
   for (int number = 10; number <= 12; ++number) {
     const SolveSummary summary = move(number, 20);
-    most = std::max(most, std::pow(summary.initial_energy / summary.energy, 1 / GetParam()));
+    most = std::max(most, std::pow(summary.trace[soon].energy / summary.energy, 1 / GetParam()));
   }
   EXPECT_LE(most, 1.1);
 }
