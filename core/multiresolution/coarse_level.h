@@ -123,9 +123,10 @@ class CoarseLevel {
   std::shared_ptr<const RestShape> shape_;
   double bending_ = 1;  // of the fine level
   std::unique_ptr<LevelSolver> solver_;
-  std::optional<Pose>
-      led_to_;  // the solver's state, where lead() has come to it; the lowest level may have gone on
-  std::optional<Points> alone_from_;  // of the coarse vertices, where the fine level has begun to go alone
+  /// The solver's state, where lead() has come to it. least_energy() may since have moved the solver of the lowest level on.
+  std::optional<Pose> led_to_;
+  std::optional<Points>
+      alone_from_;  // the fine state at the coarse vertices, from which the fine level goes alone
 };
 
 }  // namespace lpdeform

@@ -171,7 +171,9 @@ Points Deformer::Impl::current_guess() {
   const bool can_lead = warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, bending);
   const bool had_no_time = std::exchange(goes_alone, false) && fine_iterations == 0;
   if (had_no_time) moves_to_lead = kMovesToLeadWithoutTime;
-  if (can_lead && can_go_alone() && moves_to_lead-- <= 0) {
+  const bool is_to_lead = moves_to_lead > 0;
+  if (is_to_lead) --moves_to_lead;
+  if (can_lead && can_go_alone() && !is_to_lead) {
     if (std::optional<Points> alone = guess_alone()) {
       coarse->go_alone(x);
       x_before_move = x;

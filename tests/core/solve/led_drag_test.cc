@@ -94,6 +94,18 @@ INSTANTIATE_TEST_SUITE_P(LowNorms, LedDragOfLowPTest, testing::Values(1.5, 2.0))
 
 class LedDragAtTwoTest : public LedDragTest {};
 
+TEST_P(LedDragAtTwoTest, IsAtTheMinimumWhereMovesHaveTimeForThreeIterations) {
+  for (int number = 1; number < 12; ++number) (void)move(number, 3);
+  EXPECT_LE(above_minimum(move(12, 3)), 1.1);
+}
+
+/// The coarse levels have stayed behind meanwhile, and have to be moved first. 1.9 times the minimum, were they not.
+TEST_P(LedDragAtTwoTest, IsLedOnAfterMovesThatItMadeAlone) {
+  for (int number = 1; number <= 8; ++number) (void)move(number, 20);
+  for (int number = 12; number <= 24; number += 4) (void)move(number, 1);
+  EXPECT_LE(above_minimum(move(25)), 1.3);
+}
+
 TEST_P(LedDragAtTwoTest, GivesTheSameBitsOnAnyNumberOfThreads) {
   auto other = deformer(shape, bent(0), Material::uniform(2), {.threads = 2});
   (void)other->solve({});
