@@ -4,54 +4,45 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/mesh/collapsible_mesh.h"
+#include "core/mesh/corner_table.h"
 
 namespace lpdeform {
 namespace {
 
-using HalfEdgeMesh = CollapsibleMesh;
-using HalfEdge = OpenMesh::SmartHalfedgeHandle;
-using OpenMesh::Vec3d;
-
-constexpr double kGrowth = 1.2;  // factor from round to round of the longest edge to collapse
-constexpr unsigned kLargestValence = 10;
+constexpr double kGrowth = 1.2;       // factor from round to round of the longest edge to collapse
+constexpr int kMostNeighbours = 14;   // of the two ends of a collapsed edge together
 constexpr double kLargestTurn = 0.5;  // the cosine
 
-bool may_collapse(HalfEdgeMesh& mesh, HalfEdge half_edge) {
-  if (half_edge.from().is_boundary() && !half_edge.edge().is_boundary()) return false;
-  if (half_edge.from().valence() + half_edge.to().valence() > kLargestValence + 4) return false;
-  return mesh.is_collapse_ok(half_edge) && keeps_orientation(mesh, half_edge, kLargestTurn);
-}
-
 /// One round; `left` counts vertices.
-void collapse_up_to(HalfEdgeMesh& mesh, double longest, std::int32_t vertices, std::int32_t& left,
+void collapse_up_to(CornerTable& table, double longest, std::int32_t vertices, std::int32_t& left,
                     std::vector<std::int32_t>& went_into) {
-  for (const auto edge : mesh.edges()) {
+  for (std::int32_t edge = 0; edge < table.edge_count(); ++edge) {
     if (left <= vertices) return;
-    if (edge.deleted() || mesh.calc_edge_sqr_length(edge) > longest * longest) continue;
-    for (const auto half_edge : {edge.h0(), edge.h1()}) {
-      if (!may_collapse(mesh, half_edge)) continue;
-      went_into[half_edge.from().idx()] = half_edge.to().idx();
-      mesh.collapse(half_edge);
+    if (table.squared_length(edge) > longest * longest) continue;
+    for (const CornerTable::Way& way : table.ways(edge)) {
+      if (!table.may_collapse(way, kMostNeighbours, kLargestTurn)) continue;
+      went_into[way.from] = way.to;
+      table.collapse(way);
       --left;
       break;
     }
   }
 }
 
-std::vector<std::int32_t> collapse(HalfEdgeMesh& mesh, std::int32_t vertices) {
-  std::vector<std::int32_t> went_into(mesh.n_vertices());
+std::vector<std::int32_t> collapse(CornerTable& table, std::int32_t all, std::int32_t vertices) {
+  std::vector<std::int32_t> went_into(all);
   std::iota(went_into.begin(), went_into.end(), 0);
-  std::vector<double> lengths;
-  for (const auto edge : mesh.edges()) lengths.push_back(mesh.calc_edge_length(edge));
+  std::vector<double> lengths(table.edge_count());
+  for (std::int32_t edge = 0; edge < table.edge_count(); ++edge)
+    lengths[edge] = std::sqrt(table.squared_length(edge));
   if (lengths.empty()) return went_into;
   std::nth_element(lengths.begin(), lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 8),
                    lengths.end());
   double longest = lengths[lengths.size() / 8];
-  auto left = static_cast<std::int32_t>(mesh.n_vertices());
+  std::int32_t left = all;
   for (int idle = 0; left > vertices && idle < 8; longest *= kGrowth) {
     const std::int32_t before = left;
-    collapse_up_to(mesh, longest, vertices, left, went_into);
+    collapse_up_to(table, longest, vertices, left, went_into);
     idle = before - left > left / 100 ? 0 : idle + 1;
   }
   return went_into;
@@ -66,8 +57,9 @@ std::size_t CoarseMesh::memory_bytes() const {
 }
 
 CoarseMesh coarsen(const TriangleMesh& mesh, std::int32_t vertices) {
-  HalfEdgeMesh half_edges = to_collapsible(mesh);
-  std::vector<std::int32_t> went_into = collapse(half_edges, vertices);
+  CornerTable table(mesh);
+  std::vector<std::int32_t> went_into =
+      collapse(table, static_cast<std::int32_t>(mesh.vertices.rows()), vertices);
   for (std::int32_t& into : went_into) {
     while (into != went_into[into]) into = went_into[into];
   }
@@ -85,12 +77,7 @@ CoarseMesh coarsen(const TriangleMesh& mesh, std::int32_t vertices) {
   for (std::size_t c = 0; c < result.fine_vertex.size(); ++c) {
     result.mesh.vertices.row(static_cast<Eigen::Index>(c)) = mesh.vertices.row(result.fine_vertex[c]);
   }
-  std::vector<std::int32_t> corners;
-  for (const auto face : half_edges.faces()) {
-    for (const auto vertex : face.vertices()) corners.push_back(place[vertex.idx()]);
-  }
-  result.mesh.faces =
-      Eigen::Map<const Faces>(corners.data(), static_cast<Eigen::Index>(corners.size() / 3), 3);
+  result.mesh.faces = table.faces().unaryExpr([&](std::int32_t v) { return place[v]; });
   return result;
 }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/mesh/collapsible_mesh.h"
+#include "core/shapes/collapsible_mesh.h"
 
 namespace lpdeform {
 namespace {

@@ -7,7 +7,7 @@ import zipfile
 import pytest
 
 NATIVE = pathlib.Path(__file__).parents[1] / "native"
-TEXTS = ["lpdeform", "nanobind", "robin-map", "eigen3", "nlohmann-json3", "absl", "hwy", "meshoptimizer", "openmesh", "tbb"]
+TEXTS = ["lpdeform", "nanobind", "robin-map", "eigen3", "nlohmann-json3", "absl", "hwy", "meshoptimizer", "tbb"]
 FILES = [
     "lpdeform/",  # auditwheel gives folders entries of their own
     "lpdeform/session.py",

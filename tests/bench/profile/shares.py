@@ -9,7 +9,7 @@ import subprocess
 PARTS = (
     ("reading the mesh", r"(^|::)read_|parse|OpenMesh|strto|from_chars|MeshReport|weld"),
     ("rest shape, weights", r"RestShape|cotangent|weights_of|CellBlocks"),
-    ("coarse level", r"CoarseLevel|decimat|QuadricT|Multiresolution|HeapT"),
+    ("coarse level", r"CoarseLevel|coarsen|CornerTable|Multiresolution"),
     ("ordering, analysis", r"^amd_|_amd|cholmod_(l_)?(analy|super_symbolic|etree|post|rowcol|transpose|ptranspose|aat)|"
                            r"find_updates|find_entries|cut_branches|analyse_supernodes"),
     ("factorisation", r"SubtractUpdate|Substitute|SingleCholesky|SolvingTriangle|Metric::f|cholmod_|dgemm|dsyrk|dtrsm|dpotr|"

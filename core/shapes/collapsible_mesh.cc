@@ -1,4 +1,4 @@
-#include "core/mesh/collapsible_mesh.h"
+#include "core/shapes/collapsible_mesh.h"
 
 namespace lpdeform {
 
