@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kPasses = 12;
 constexpr double kRefined = 1e-12;  // refinement ends when the correction's share of the result is <= this
-constexpr std::size_t kBytesPerEntry = 40;  // per matrix entry: the value and its places in the factor
+constexpr std::size_t kBytesPerEntry = 32;  // per matrix entry: its row and its places in the factor
 constexpr double kSlowest = 0.3;            // the largest ratio of a correction to the previous one
 
 LowerMatrix lower_pattern(const RestShape& shape) {
@@ -26,7 +26,6 @@ LowerMatrix lower_pattern(const RestShape& shape) {
     }
     matrix.columns.push_back(static_cast<std::int32_t>(matrix.rows.size()));
   }
-  matrix.values.assign(matrix.rows.size(), 0.0);
   return matrix;
 }
 
@@ -63,26 +62,33 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
     cell_weights_ = std::move(clipped);
     is_held_ = is_held;
     entries_ = std::move(scaled);
-    fill_matrix(workers);
+    matrix_.values.clear();
   }
   precision_ = precision;
   is_single_current_ = is_double_current_ = false;
   ++version_;
+  need_values(workers);
   if (precision == Precision::kSingle && single_.factor(matrix_, workers)) {
     double_.reset();  // takes several times the memory
     copy_ = {};
+    matrix_.values = std::vector<double>();
     return is_good_ = is_single_current_ = true;
   }
-  return is_good_ = factor_double();
+  return is_good_ = factor_double(workers);
 }
 
-bool Metric::factor_double() const {
+bool Metric::factor_double(const Workers& workers) const {
+  need_values(workers);
   if (!double_) double_.emplace(matrix_, single_.result().new_to_old());
   copy_.clear();
   return is_double_current_ = double_->factor(matrix_);
 }
 
-void Metric::fill_matrix(const Workers& workers) {
+/// Fills the matrix's values in, unless they are there. A factor in single precision does without them, until something is solved
+/// to more digits.
+void Metric::need_values(const Workers& workers) const {
+  if (!matrix_.values.empty()) return;
+  matrix_.values.resize(matrix_.rows.size());
   const auto n = static_cast<std::size_t>(shape_->vertex_count());
   workers.for_chunks(n, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (auto i = static_cast<std::int32_t>(begin); i < static_cast<std::int32_t>(end); ++i) {
@@ -100,7 +106,7 @@ void Metric::fill_matrix(const Workers& workers) {
   for (const MatrixEntry& entry : entries_) add_entry(entry);
 }
 
-void Metric::add_entry(const MatrixEntry& entry) {
+void Metric::add_entry(const MatrixEntry& entry) const {
   if (is_held_[entry.row] || is_held_[entry.column]) return;
   const auto begin = matrix_.rows.begin() + matrix_.columns[entry.column];
   const auto end = matrix_.rows.begin() + matrix_.columns[entry.column + 1];
@@ -169,6 +175,7 @@ Points Metric::turning_forces(const Points& from, const Points& to, const std::v
 
 /// x = matrix_^-1 b, x not b, by refinement from single precision. False if that does not converge.
 bool Metric::refine(const Points& b, Points& x, const Workers& workers) const {
+  need_values(workers);
   solve_single(b, x, workers);
   Points rest, correction;
   double before = x.norm();
@@ -188,7 +195,7 @@ bool Metric::refine(const Points& b, Points& x, const Workers& workers) const {
 
 void Metric::solve_scaled(const Points& b, Points& x, const Workers& workers) const {
   if (!is_double_current_ && refine(b, x, workers)) return;
-  if (!is_double_current_ && !factor_double()) {
+  if (!is_double_current_ && !factor_double(workers)) {
     x.setConstant(b.rows(), 3, std::numeric_limits<double>::quiet_NaN());
     return;
   }

@@ -107,9 +107,9 @@ class Metric {
   double edge_weight(std::int32_t i, std::int32_t k) const {
     return 2 * (cell_weights_[i] + cell_weights_[shape_->neighbours()[k]]) * shape_->weights()[k];
   }
-  void add_entry(const MatrixEntry& entry);
-  void fill_matrix(const Workers& workers);
-  bool factor_double() const;
+  void need_values(const Workers& workers) const;
+  void add_entry(const MatrixEntry& entry) const;
+  bool factor_double(const Workers& workers) const;
   bool refine(const Points& b, Points& x, const Workers& workers) const;
   void solve_single(const Points& b, Points& x, const Workers& workers, double factor = 1) const;
   void solve_scaled(const Points& b, Points& x, const Workers& workers) const;
@@ -123,7 +123,7 @@ class Metric {
   double scale_ = 1;                  // the largest cell weight: M = scale_ * matrix_ on the free vertices
   bool is_good_ = false;
   std::uint64_t version_ = 0;
-  LowerMatrix matrix_;
+  mutable LowerMatrix matrix_;  // its values are there when needed
   SingleCholesky single_;
   Precision precision_ = Precision::kSingle;  // the requested one
   bool is_single_current_ = false;

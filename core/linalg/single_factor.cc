@@ -142,8 +142,8 @@ void SingleFactor::cut_branches() {
   }
 }
 
-/// Gives the branch places of its own in work_ for its contributions to its ancestors.
-void SingleFactor::send_elsewhere(Branch& branch) {
+/// Gives the branch places of its own, from `begin` of work_ on, for its contributions to its ancestors. Returns their end.
+std::size_t SingleFactor::send_elsewhere(Branch& branch, std::size_t begin) {
   std::vector<std::int32_t> place(new_to_old_.size(), -1);
   for (const auto& [first, last] : branch.subtrees) {
     const std::int32_t end = supernodes_[last].first_column + supernodes_[last].columns;
@@ -152,20 +152,21 @@ void SingleFactor::send_elsewhere(Branch& branch) {
       const std::int32_t row = rows_[r];
       if (row < end) continue;
       if (place[row] < 0) {
-        place[row] = static_cast<std::int32_t>(work_.size() + branch.owed.size());
+        place[row] = static_cast<std::int32_t>(begin + branch.owed.size());
         branch.owed.push_back(row);
       }
       forward_rows_[r] = place[row];
     }
   }
-  work_.resize(work_.size() + branch.owed.size());
+  return begin + branch.owed.size();
 }
 
 void SingleFactor::finish() {
-  work_.resize(new_to_old_.size());
   forward_rows_ = rows_;
   cut_branches();
-  for (Branch& branch : branches_) send_elsewhere(branch);
+  std::size_t places = new_to_old_.size();
+  for (Branch& branch : branches_) places = send_elsewhere(branch, places);
+  work_ = std::vector<Row>(places);
 }
 
 /// x = L^-1 b for supernodes first to last, in work_.

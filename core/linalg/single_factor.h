@@ -69,7 +69,7 @@ class SingleFactor {
   std::vector<std::int32_t> node_of_columns() const;
   std::vector<std::int32_t> parents() const;
   void cut_branches();
-  void send_elsewhere(Branch& branch);
+  std::size_t send_elsewhere(Branch& branch, std::size_t begin);
   void solve_forward(std::size_t first, std::size_t last, const std::vector<std::int32_t>& rows) const;
   void solve_backward(std::size_t first, std::size_t last) const;
   float* new_supernode(std::int32_t columns, const std::int32_t* rows, std::size_t row_count);

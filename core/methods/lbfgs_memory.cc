@@ -39,7 +39,18 @@ std::vector<double> LbfgsMemory::products(const Points& gradient, const Points& 
   return sums;
 }
 
-/// Stores the candidate; drops the oldest pair if there are too many.
+/// Drops the oldest pair if there is no room for another one.
+void LbfgsMemory::make_room() {
+  if (pairs_.size() < most_pairs_) return;
+  candidate_ = std::move(pairs_.front());
+  pairs_.erase(pairs_.begin());
+  for (Pair& younger : pairs_) {
+    younger.sy.erase(younger.sy.begin());
+    younger.zy.erase(younger.zy.begin());
+  }
+}
+
+/// Stores the candidate.
 void LbfgsMemory::take_in(const std::vector<double>& sums) {
   Pair pair = std::move(candidate_);
   pair.sy.clear();
@@ -49,13 +60,6 @@ void LbfgsMemory::take_in(const std::vector<double>& sums) {
     pair.zy.push_back(sums[at + 3]);
   }
   pairs_.push_back(std::move(pair));
-  if (pairs_.size() <= most_pairs_) return;
-  candidate_ = std::move(pairs_.front());
-  pairs_.erase(pairs_.begin());
-  for (Pair& younger : pairs_) {
-    younger.sy.erase(younger.sy.begin());
-    younger.zy.erase(younger.zy.begin());
-  }
 }
 
 double LbfgsMemory::direction(const Points& gradient, const Points& gradient_before, const SinglePoints& h,
@@ -64,14 +68,11 @@ double LbfgsMemory::direction(const Points& gradient, const Points& gradient_bef
     d = -gamma_ * h.cast<double>();
     return gradient.cwiseProduct(d).sum();
   }
-  std::vector<double> sums = products(gradient, gradient_before, h, h_before, length, d);
+  make_room();
+  const std::vector<double> sums = products(gradient, gradient_before, h, h_before, length, d);
   const double curvature = sums[sums.size() - 2];
   const double size = length * std::sqrt(sums[0]) * std::sqrt(sums[1]);
-  if (curvature > kLeastCurvature * size) {
-    const bool is_full = pairs_.size() == most_pairs_;
-    take_in(sums);
-    if (is_full) sums.erase(sums.begin() + kSumsBefore, sums.begin() + kSumsBefore + kSumsOfPair);
-  }
+  if (curvature > kLeastCurvature * size) take_in(sums);
 
   const std::size_t m = pairs_.size();
   if (m > 0) gamma_ = std::clamp(pairs_.back().sy.back() / pairs_.back().zy.back(), kLeastGamma, kMostGamma);

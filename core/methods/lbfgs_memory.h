@@ -34,8 +34,8 @@ class LbfgsMemory {
   bool is_empty() const { return pairs_.empty(); }
 
   /// d = -H g; returns <g, d>. `length` > 0 means that the step length * d was made since the last call, at which
-  /// gradient and h were gradient_before and h_before. Its pair is then stored, unless <s, y> is not positive to
-  /// rounding. Pass 0 if no step was made, or after clear(); then d = -gamma h.
+  /// gradient and h were gradient_before and h_before. Its pair is then stored, unless <s, y> is not positive to rounding; the oldest
+  /// is dropped for it where there are `most_pairs`. Pass 0 if no step was made, or after clear(); then d = -gamma h.
   double direction(const Points& gradient, const Points& gradient_before, const SinglePoints& h,
                    const SinglePoints& h_before, double length, Points& d);
 
@@ -47,6 +47,7 @@ class LbfgsMemory {
   std::vector<KeptPair> kept() const;
   std::vector<double> products(const Points& gradient, const Points& gradient_before, const SinglePoints& h,
                                const SinglePoints& h_before, double length, const Points& d);
+  void make_room();
   void take_in(const std::vector<double>& sums);
 
   Workers workers_;

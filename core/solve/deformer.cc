@@ -16,8 +16,8 @@ namespace lpdeform {
 namespace {
 
 // What a running solve holds, in positions of all vertices: QuasiNewton has 5 states, gradients and directions, and in single precision
-// 2 more and 7 pairs of L-BFGS.
-constexpr std::size_t kWorkspace = 13;
+// 2 more and 6 pairs of L-BFGS.
+constexpr std::size_t kWorkspace = 12;
 // What a Deformer holds besides: x, positions, x_before_move, energies and weights.
 constexpr std::size_t kStates = 4;
 constexpr std::size_t kCellBytes = 60, kEdgeBytes = 30;  // of CellPass: per vertex, per directed edge
