@@ -43,6 +43,8 @@ class LpNorm {
     return {value, value * half_p / v};
   }
 
+  /// Whether all cells have the same p and stiffness.
+  bool is_uniform() const { return is_uniform_; }
   double p(std::int32_t i) const { return 2 * half_p_[at(i)]; }
   /// s_i f_i / r^{p_i}: the term of an unsmoothed cell is coefficient(i) E_i^{p_i}.
   double coefficient(std::int32_t i) const { return scale_[at(i)] / power(r2_, half_p_[at(i)]); }

@@ -110,6 +110,8 @@ double QuasiNewton::first_smoothing(Warmth warmth, double lowest_p) const {
 /// The sum that smoothing gives to undistorted cells with p_i < 2: an upper bound of what smoothing adds to the
 /// objective.
 double QuasiNewton::smoothing_sum() const {
+  if (problem_.norm.lowest_p() >= 2) return 0;
+  if (problem_.norm.is_uniform()) return problem_.shape().cell_count() * problem_.norm.term(0, eps2_).value;
   const auto& offsets = problem_.shape().offsets();
   double sum = 0;
   for (std::int32_t i = 0; i < problem_.shape().vertex_count(); ++i) {

@@ -18,6 +18,24 @@ constexpr double kMostOverLeast = 1.8;  // see guess_alone
 // Moves that coarse levels lead after guess_alone has refused, and where there was no time for an iteration after it.
 constexpr int kMovesToLead = 3, kMovesToLeadWithoutTime = 12;
 
+template <typename Body>
+void for_rows(const Points& points, const Workers& workers, const Body& body) {
+  workers.for_chunks(
+      static_cast<std::size_t>(points.rows()), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+        for (auto i = static_cast<Eigen::Index>(begin); i < static_cast<Eigen::Index>(end); ++i) body(i);
+      });
+}
+
+/// The squared length of the longest way that a vertex has moved.
+double longest_move(const Points& before, const Points& now, const Workers& workers) {
+  std::vector<double> longest((static_cast<std::size_t>(now.rows()) + kChunk - 1) / kChunk, 0.0);
+  for_rows(now, workers, [&](Eigen::Index i) {
+    double& chunk = longest[static_cast<std::size_t>(i) / kChunk];
+    chunk = std::max(chunk, (now.row(i) - before.row(i)).squaredNorm());
+  });
+  return *std::max_element(longest.begin(), longest.end());
+}
+
 }  // namespace
 
 /// The soft terms as springs (p = 2, for cells of weight 1), evaluated at the rest shape with held vertices at their
@@ -51,19 +69,15 @@ std::optional<Points> Deformer::Impl::led_guess() {
   const Points& moved = motion->positions;
   const Points forces = metric.turning_forces(from, moved, motion->turns, workers());
   Points u(x.rows(), 3);
-  for (Eigen::Index i = 0; i < x.rows(); ++i) {
-    if (constraints->is_held[i]) u.row(i) = constraints->targets.row(i) - moved.row(i);
-  }
+  for (const std::int32_t i : constraints->exact.vertices)
+    u.row(i) = constraints->targets.row(i) - moved.row(i);
   metric.extend(constraints->is_held, u, workers(), &forces);
-  workers().for_chunks(
-      constraints->is_held.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
-        for (auto i = static_cast<Eigen::Index>(begin); i < static_cast<Eigen::Index>(end); ++i) {
-          if (constraints->is_held[i])
-            u.row(i) = constraints->targets.row(i);
-          else
-            u.row(i) += moved.row(i);
-        }
-      });
+  for_rows(u, workers(), [&](Eigen::Index i) {
+    if (constraints->is_held[i])
+      u.row(i) = constraints->targets.row(i);
+    else
+      u.row(i) += moved.row(i);
+  });
   lead = Lead::kTogether;
   return u;
 }
@@ -97,40 +111,40 @@ void Deformer::Impl::follow(const Points& guess) {
 
 /// Whether each held vertex of `from` is where it is held.
 bool Deformer::Impl::is_at_targets(const Points& from) const {
-  for (Eigen::Index i = 0; i < from.rows(); ++i) {
-    if (constraints->is_held[i] && from.row(i) != constraints->targets.row(i)) return false;
-  }
-  return true;
+  const std::vector<std::int32_t>& held = constraints->exact.vertices;
+  return std::all_of(held.begin(), held.end(),
+                     [&](std::int32_t i) { return from.row(i) == constraints->targets.row(i); });
 }
 
 /// Extrapolates a drag from x: if the handles move in about the same way as in the last move, by the factor `share` of that move,
 /// the surface does the same. The remaining displacement of handles and soft targets is extended harmonically. `forces` are
-/// those of soft targets.
-Points Deformer::Impl::continued(Points forces) const {
-  const Points last =
-      x_before_move.rows() == x.rows() ? Points(x - x_before_move) : Points(Points::Zero(x.rows(), 3));
-  Points u = Points::Zero(x.rows(), 3);
+/// those of soft targets, or null.
+Points Deformer::Impl::continued(const Points* forces) const {
+  const bool has_moved = x_before_move.rows() == x.rows();
+  const auto last = [this](Eigen::Index i) -> Eigen::RowVector3d { return x.row(i) - x_before_move.row(i); };
+  Points u(x.rows(), 3);
   double along = 0, size = 0, left = 0, longest = 0;
-  for (Eigen::Index i = 0; i < x.rows(); ++i) {
-    if (!constraints->is_held[i]) continue;
+  for (const std::int32_t i : constraints->exact.vertices) {
     u.row(i) = constraints->targets.row(i) - x.row(i);
-    along += u.row(i).dot(last.row(i));
-    size += last.row(i).squaredNorm();
-    longest = std::max(longest, last.row(i).squaredNorm());
     left += u.row(i).squaredNorm();
+    if (!has_moved) continue;
+    along += u.row(i).dot(last(i));
+    size += last(i).squaredNorm();
+    longest = std::max(longest, last(i).squaredNorm());
   }
   const double share = size > 0 ? along / size : 0;
   const bool goes_on = share > 0 && share < kFarthestGuess && along * along > kSameWay * size * left &&
-                       last.rowwise().squaredNorm().maxCoeff() < kSteady * longest;
+                       longest_move(x_before_move, x, workers()) < kSteady * longest;
   if (goes_on) {
-    forces.setZero();  // soft targets move with the drag
-    for (Eigen::Index i = 0; i < x.rows(); ++i) {
-      if (constraints->is_held[i]) u.row(i) -= share * last.row(i);
-    }
+    forces = nullptr;  // soft targets move with the drag
+    for (const std::int32_t i : constraints->exact.vertices) u.row(i) -= share * last(i);
   }
-  metric.extend(constraints->is_held, u, workers(), &forces);
-  if (goes_on) u += share * last;
-  return x + u;
+  metric.extend(constraints->is_held, u, workers(), forces);
+  for_rows(u, workers(), [&](Eigen::Index i) {
+    if (goes_on) u.row(i) += share * last(i);
+    u.row(i) += x.row(i);
+  });
+  return u;
 }
 
 /// The guess of a drag that the coarse levels do not lead. It takes half of the time. nullopt if it is not good enough: if its E^(1/2)
@@ -140,10 +154,9 @@ std::optional<Points> Deformer::Impl::guess_alone() {
   Points guess;
   workers().run_both([&] { least = coarse->least_energy(coarse_inputs(effective_material()), stop); },
                      [&] {
-                       guess = continued(Points::Zero(x.rows(), 3));
-                       for (Eigen::Index i = 0; i < x.rows(); ++i) {
-                         if (constraints->is_held[i]) guess.row(i) = constraints->targets.row(i);
-                       }
+                       guess = continued(nullptr);
+                       for (const std::int32_t i : constraints->exact.vertices)
+                         guess.row(i) = constraints->targets.row(i);
                      });
   if (!least || !guess.allFinite()) return std::nullopt;
   const double most = kMostOverLeast * *least / unit();
@@ -160,10 +173,13 @@ bool Deformer::Impl::can_go_alone() const {
 
 /// The guess of a solve that goes on from x: by the fine level alone, where that is good enough, or led by the coarse levels.
 Points Deformer::Impl::current_guess() {
-  Points forces = Points::Zero(x.rows(), 3);
+  std::optional<Points> forces;
   const SoftTerms& before = objective.soft_terms();
-  if (constraints->soft.has_rows_of(before)) constraints->soft.add_pull(before, forces);
-  if (is_at_targets(x) && forces.isZero(0)) {
+  if (!constraints->soft.empty() && constraints->soft.has_rows_of(before)) {
+    forces = Points::Zero(x.rows(), 3);
+    constraints->soft.add_pull(before, *forces);
+  }
+  if (is_at_targets(x) && (!forces || forces->isZero(0))) {
     lead = Lead::kNone;  // the fine level goes on alone
     x_before_move = x;
     return x;
@@ -187,7 +203,7 @@ Points Deformer::Impl::current_guess() {
     x_before_move = x;
     return go_with(*std::move(led));
   }
-  Points guess = continued(std::move(forces));
+  Points guess = continued(forces ? &*forces : nullptr);
   x_before_move = x;
   if (!can_lead) return guess;
   if (!guess.allFinite()) {
@@ -211,9 +227,7 @@ Points Deformer::Impl::initial_guess(InitialGuess guess) {
   if (is_guess_evaluated && constraints->linear.empty()) return result;
   is_guess_evaluated = false;
   // Sets held vertices exactly to their targets, which removes the solve's rounding.
-  for (Eigen::Index i = 0; i < result.rows(); ++i) {
-    if (constraints->is_held[i]) result.row(i) = constraints->targets.row(i);
-  }
+  for (const std::int32_t i : constraints->exact.vertices) result.row(i) = constraints->targets.row(i);
   constraints->linear.satisfy_within(metric, result, workers());
   return result;
 }

@@ -36,7 +36,7 @@ struct Deformer::Impl {
   double length_unit() const { return material.length_unit > 0 ? material.length_unit : unit(); }
 
   Points laplacian_guess();
-  Points continued(Points forces) const;
+  Points continued(const Points* forces) const;
   std::optional<Points> guess_alone();
   bool can_go_alone() const;
   Points current_guess();
