@@ -84,8 +84,8 @@ bool Metric::factor_double(const Workers& workers) const {
   return is_double_current_ = double_->factor(matrix_);
 }
 
-/// Fills the matrix's values in, unless they are there. A factor in single precision does without them, until something is solved
-/// to more digits.
+/// Makes the matrix's values if there are none. They are freed after a factorisation in single precision. Refinement and a factor in
+/// double precision need them again.
 void Metric::need_values(const Workers& workers) const {
   if (!matrix_.values.empty()) return;
   matrix_.values.resize(matrix_.rows.size());

@@ -123,7 +123,7 @@ class Metric {
   double scale_ = 1;                  // the largest cell weight: M = scale_ * matrix_ on the free vertices
   bool is_good_ = false;
   std::uint64_t version_ = 0;
-  mutable LowerMatrix matrix_;  // its values are there when needed
+  mutable LowerMatrix matrix_;  // see need_values()
   SingleCholesky single_;
   Precision precision_ = Precision::kSingle;  // the requested one
   bool is_single_current_ = false;

@@ -142,7 +142,7 @@ void SingleFactor::cut_branches() {
   }
 }
 
-/// Gives the branch places of its own, from `begin` of work_ on, for its contributions to its ancestors. Returns their end.
+/// A branch adds to its ancestors in places of its own in work_. They begin at `begin`; returns where they end.
 std::size_t SingleFactor::send_elsewhere(Branch& branch, std::size_t begin) {
   std::vector<std::int32_t> place(new_to_old_.size(), -1);
   for (const auto& [first, last] : branch.subtrees) {

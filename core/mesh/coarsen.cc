@@ -18,7 +18,7 @@ void collapse_up_to(CornerTable& table, double longest, std::int32_t vertices, s
                     std::vector<std::int32_t>& went_into) {
   for (std::int32_t edge = 0; edge < table.edge_count(); ++edge) {
     if (left <= vertices) return;
-    if (table.squared_length(edge) > longest * longest) continue;
+    if (table.is_gone(edge) || table.squared_length(edge) > longest * longest) continue;
     for (const CornerTable::Way& way : table.ways(edge)) {
       if (!table.may_collapse(way, kMostNeighbours, kLargestTurn)) continue;
       went_into[way.from] = way.to;

@@ -2,17 +2,11 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "core/mesh/half_edges.h"
 
 namespace lpdeform {
-namespace {
-
-constexpr double kGone = std::numeric_limits<double>::infinity();
-
-}  // namespace
 
 CornerTable::CornerTable(const TriangleMesh& mesh)
     : points_(mesh.vertices), vertex_(mesh.faces.data(), mesh.faces.data() + mesh.faces.size()) {
@@ -20,33 +14,52 @@ CornerTable::CornerTable(const TriangleMesh& mesh)
     std::int32_t* const corners = vertex_.data() + f;
     if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) corners[0] = -1;
   }
-  while (!join_once(mesh.faces)) {
-  }
+  if (!join(mesh.faces)) join(mesh.faces);  // now of the faces that are kept
   number_edges();
   lock_joints();
 }
 
-/// Finds the twins. False if it has dropped faces that have a half-edge in common with an earlier one.
-bool CornerTable::join_once(const Faces& faces) {
-  bool is_manifold = true;
+/// Finds the twins. False if half-edges are in several faces: it has then left faces out.
+bool CornerTable::join(const Faces& faces) {
   twin_.assign(vertex_.size(), -1);
+  std::vector<Claim> claims;
+  std::int32_t shared = 0;  // half-edges that are in several faces
   const EdgeTable edges(points_.rows(), faces, [&](Eigen::Index f) { return vertex_[3 * f] >= 0; });
   edges.for_edges([&](std::int32_t low, std::int32_t, std::span<const HalfEdge> half_edges) {
     std::array<std::int32_t, 2> first{-1, -1};  // from low to high, and back
+    bool is_shared = false;
     for (const HalfEdge half_edge : half_edges) {
       std::int32_t& same = first[faces.data()[half_edge.id] == low ? 0 : 1];
-      if (same >= 0) {
-        vertex_[half_edge.id - half_edge.id % 3] = -1;
-        is_manifold = false;
-      } else {
+      if (same >= 0)
+        is_shared = true;
+      else
         same = half_edge.id;
-      }
     }
-    if (first[0] < 0 || first[1] < 0) return;
-    twin_[first[0]] = first[1];
-    twin_[first[1]] = first[0];
+    if (is_shared) {
+      for (const HalfEdge half_edge : half_edges)
+        claims.push_back({half_edge.id, shared + (faces.data()[half_edge.id] == low ? 0 : 1)});
+      shared += 2;
+    } else if (first[0] >= 0 && first[1] >= 0) {
+      twin_[first[0]] = first[1];
+      twin_[first[1]] = first[0];
+    }
   });
-  return is_manifold;
+  leave_out(std::move(claims), shared);
+  return shared == 0;
+}
+
+/// Leaves a face out if an earlier one that is kept has one of its half-edges.
+void CornerTable::leave_out(std::vector<Claim> claims, std::int32_t shared) {
+  std::sort(claims.begin(), claims.end(), [](Claim a, Claim b) { return a.half_edge < b.half_edge; });
+  std::vector<char> is_taken(shared, 0);
+  for (auto begin = claims.begin(), end = begin; begin != claims.end(); begin = end) {
+    const std::int32_t face = begin->half_edge / 3;
+    end = std::find_if(begin, claims.end(), [&](Claim claim) { return claim.half_edge / 3 != face; });
+    if (std::any_of(begin, end, [&](Claim claim) { return is_taken[claim.shared] != 0; }))
+      vertex_[3 * face] = -1;
+    else
+      std::for_each(begin, end, [&](Claim claim) { is_taken[claim.shared] = 1; });
+  }
 }
 
 void CornerTable::number_edges() {
@@ -63,7 +76,7 @@ void CornerTable::number_edges() {
   }
 }
 
-/// Locks the vertices whose faces are not all reached from one by way of edges.
+/// Locks each vertex whose faces form more than one fan.
 void CornerTable::lock_joints() {
   std::vector<std::int32_t> not_reached(points_.rows(), 0);
   for (std::size_t c = 0; c < vertex_.size(); ++c) {
@@ -89,7 +102,8 @@ std::array<CornerTable::Way, 2> CornerTable::ways(std::int32_t edge) const {
   return {back, there};
 }
 
-/// Calls visit for the corners at the vertex in turn until it returns false. Returns whether the vertex is on a boundary.
+/// Calls visit for the corners at the vertex in turn until it returns false. Returns whether the vertex is on a boundary, if all
+/// were visited.
 template <typename Visit>
 bool CornerTable::visit_corners(std::int32_t vertex, const Visit& visit) const {
   const std::int32_t first = corner_[vertex];
@@ -163,7 +177,7 @@ bool CornerTable::may_collapse(const Way& way, int most_neighbours, double cosin
          keeps_orientation(way, cosine);
 }
 
-/// Takes away the face of the half-edges `kept` and `dropped`, whose edges become one: that of `kept`.
+/// Removes a face. `kept` and `dropped` are two of its half-edges. Their edges become one, the edge of `kept`.
 void CornerTable::drop_face(std::int32_t kept, std::int32_t dropped) {
   const std::int32_t beside_kept = twin_[kept], beside_dropped = twin_[dropped];
   if (beside_kept >= 0) twin_[beside_kept] = beside_dropped;
@@ -176,7 +190,7 @@ void CornerTable::drop_face(std::int32_t kept, std::int32_t dropped) {
     edge.half_edge = beside_dropped;
   else if (edge.half_edge == kept)
     edge = {beside_kept, !edge.is_along};
-  squared_lengths_[edge_[dropped]] = kGone;
+  edges_[edge_[dropped]].half_edge = -1;
   for (const std::int32_t c : {beside_kept, beside_dropped}) {
     if (c >= 0) corner_[vertex_[c]] = c, corner_[vertex_[next(c)]] = next(c);
   }
@@ -184,7 +198,7 @@ void CornerTable::drop_face(std::int32_t kept, std::int32_t dropped) {
 }
 
 void CornerTable::collapse(const Way& way) {
-  squared_lengths_[edge_[way.left >= 0 ? way.left : way.right]] = kGone;
+  edges_[edge_[way.left >= 0 ? way.left : way.right]].half_edge = -1;
   for (const std::int32_t c : from_.all()) vertex_[c] = way.to;
   if (way.left >= 0) drop_face(next(way.left), previous(way.left));
   if (way.right >= 0) drop_face(previous(way.right), next(way.right));

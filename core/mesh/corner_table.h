@@ -13,13 +13,16 @@ namespace lpdeform {
 /// for the half-edge from there to the next corner of the face. -1 stands for none. One caller at a time.
 class CornerTable {
  public:
-  /// Leaves faces out that have a vertex twice, and those that have a half-edge from a to b in common with an earlier face. The mesh's
-  /// vertices must outlive this object.
+  /// Leaves out a face that names a vertex twice, and a face if an earlier one that is kept has the same half-edge from a to b.
+  /// Indices must be in range. The vertices of `mesh` must outlive this object.
   explicit CornerTable(const TriangleMesh& mesh);
+  explicit CornerTable(TriangleMesh&& mesh) = delete;
 
-  /// Edges keep their numbers. Those of collapsed faces are gone.
+  /// Edges keep their numbers.
   std::int32_t edge_count() const { return static_cast<std::int32_t>(edges_.size()); }
-  /// Infinite if the edge is gone.
+  /// Whether the edge was collapsed, or became one with another.
+  bool is_gone(std::int32_t edge) const { return edges_[edge].half_edge < 0; }
+  /// Not of an edge that is gone.
   double squared_length(std::int32_t edge) const { return squared_lengths_[edge]; }
 
   /// An edge seen as the way from one of its ends to the other.
@@ -28,7 +31,7 @@ class CornerTable {
     std::int32_t left;      // the half-edge from -> to
     std::int32_t right;     // the half-edge to -> from
   };
-  /// First the way that the edge has in the first of its faces, then the way back.
+  /// The first way runs as the edge does in the first of its faces. The second runs back. Not of an edge that is gone.
   std::array<Way, 2> ways(std::int32_t edge) const;
 
   /// Whether way.from may become one with way.to: the mesh stays a manifold, boundaries stay boundaries, the two vertices have at most
@@ -36,7 +39,7 @@ class CornerTable {
   /// cosine. False if the mesh is not a manifold at one of the two vertices.
   static constexpr int kMostNeighbours = 32;
   bool may_collapse(const Way& way, int most_neighbours, double cosine);
-  /// Does that. Only right after may_collapse(way, ...) has returned true.
+  /// Collapses the way. Call it right after may_collapse(way, ...) has returned true: it uses what that call has found.
   void collapse(const Way& way);
 
   /// The faces that are left, in their order.
@@ -53,14 +56,19 @@ class CornerTable {
     int neighbours() const { return is_open ? size + 1 : size; }
   };
   struct Edge {
-    std::int32_t half_edge;
-    bool is_along;  // its first way is that of half_edge
+    std::int32_t half_edge;  // -1: gone
+    bool is_along;           // its first way is that of half_edge
   };
 
   static std::int32_t next(std::int32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
   static std::int32_t previous(std::int32_t corner) { return corner % 3 == 0 ? corner + 2 : corner - 1; }
 
-  bool join_once(const Faces& faces);
+  /// A half-edge of a face that is in other faces, too: number `shared` of these.
+  struct Claim {
+    std::int32_t half_edge, shared;
+  };
+  bool join(const Faces& faces);
+  void leave_out(std::vector<Claim> claims, std::int32_t shared);
   void number_edges();
   void lock_joints();
   double squared_length_of(std::int32_t half_edge) const;
@@ -83,7 +91,7 @@ class CornerTable {
   std::vector<char> is_locked_;       // of each vertex: the mesh is not a manifold there
   std::vector<Edge> edges_;
   std::vector<double> squared_lengths_;  // of the edges
-  Fan from_, to_;                        // of the way that was looked at last
+  Fan from_, to_;                        // what may_collapse() found last
 };
 
 }  // namespace lpdeform

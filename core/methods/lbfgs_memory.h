@@ -26,6 +26,7 @@ using SinglePoints = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
 /// caller at a time.
 class LbfgsMemory {
  public:
+  /// `most_pairs` >= 1.
   LbfgsMemory(Workers workers, std::size_t most_pairs)
       : workers_(std::move(workers)), most_pairs_(most_pairs) {}
 
@@ -34,8 +35,8 @@ class LbfgsMemory {
   bool is_empty() const { return pairs_.empty(); }
 
   /// d = -H g; returns <g, d>. `length` > 0 means that the step length * d was made since the last call, at which
-  /// gradient and h were gradient_before and h_before. Its pair is then stored, unless <s, y> is not positive to rounding; the oldest
-  /// is dropped for it where there are `most_pairs`. Pass 0 if no step was made, or after clear(); then d = -gamma h.
+  /// gradient and h were gradient_before and h_before. Its pair is then stored, unless <s, y> is not positive to rounding. If there are
+  /// `most_pairs` already, the oldest is dropped first, even if the new pair is then not stored. Pass 0 if no step was made, or after clear(); then d = -gamma h.
   double direction(const Points& gradient, const Points& gradient_before, const SinglePoints& h,
                    const SinglePoints& h_before, double length, Points& d);
 

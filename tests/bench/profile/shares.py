@@ -7,7 +7,7 @@ import subprocess
 
 # The first that matches a function's name counts.
 PARTS = (
-    ("reading the mesh", r"(^|::)read_|parse|OpenMesh|strto|from_chars|MeshReport|weld"),
+    ("reading the mesh", r"(^|::)read_|parse|strto|from_chars|MeshReport|weld"),
     ("rest shape, weights", r"RestShape|cotangent|weights_of|CellBlocks"),
     ("coarse level", r"CoarseLevel|coarsen|CornerTable|Multiresolution"),
     ("ordering, analysis", r"^amd_|_amd|cholmod_(l_)?(analy|super_symbolic|etree|post|rowcol|transpose|ptranspose|aat)|"

@@ -153,6 +153,18 @@ TEST_F(MetricTest, GivesTheDoubleFactorBackWhenItIsNotWanted) {
   EXPECT_LT((refined - exact).norm(), 1e-11 * exact.norm());
 }
 
+TEST_F(MetricTest, HoldsTheMatrixBesideASingleFactorOnlyAfterASolve) {
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  const std::size_t before = metric.memory_bytes();
+  Points b = Points::Random(shape->vertex_count(), 3), x;
+  clear_held(b);
+  metric.solve(b, x, Workers(1));
+  EXPECT_GE(metric.memory_bytes(), before + shape->vertex_count() * sizeof(double));
+  cell_weights[0] *= 2;
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  EXPECT_EQ(metric.memory_bytes(), before);
+}
+
 TEST_F(MetricTest, GivesNoNumberForWhatIsNone) {
   ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
   for (const std::int32_t i : {1, 5, shape->vertex_count() - 1}) {

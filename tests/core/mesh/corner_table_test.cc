@@ -18,7 +18,7 @@ constexpr double kAnyTurn = -1;
 /// The first way from a to b that the table has.
 CornerTable::Way way(const CornerTable& table, std::int32_t a, std::int32_t b) {
   for (std::int32_t edge = 0; edge < table.edge_count(); ++edge) {
-    if (!std::isfinite(table.squared_length(edge))) continue;
+    if (table.is_gone(edge)) continue;
     for (const CornerTable::Way& found : table.ways(edge)) {
       if (found.from == a && found.to == b) return found;
     }
@@ -30,7 +30,7 @@ CornerTable::Way way(const CornerTable& table, std::int32_t a, std::int32_t b) {
 int edges_with_right_lengths(const CornerTable& table, const TriangleMesh& mesh) {
   int count = 0;
   for (std::int32_t edge = 0; edge < table.edge_count(); ++edge) {
-    if (!std::isfinite(table.squared_length(edge))) continue;
+    if (table.is_gone(edge)) continue;
     const auto [from, to, left, right] = table.ways(edge)[0];
     count +=
         table.squared_length(edge) == (mesh.vertices.row(to) - mesh.vertices.row(from)).squaredNorm() ? 1 : 0;
@@ -143,6 +143,17 @@ TEST(CornerTable, RefusesAVertexWithMoreNeighboursThanItTakes) {
   EXPECT_FALSE(table.may_collapse(way(table, 0, 1), CornerTable::kMostNeighbours, kAnyTurn));
 }
 
+/// Each face shares a half-edge with the one before it and the one after it.
+TEST(CornerTable, KeepsEverySecondFaceOfAStripThatIsWoundOneWay) {
+  TriangleMesh strip;
+  strip.vertices = Points::Random(102, 3);
+  strip.faces.resize(100, 3);
+  for (int f = 0; f < 100; ++f) strip.faces.row(f) << f, f + 1, f + 2;
+  const CornerTable table(strip);
+  ASSERT_EQ(table.faces().rows(), 50);
+  for (int f = 0; f < 50; ++f) EXPECT_EQ(table.faces().row(f), strip.faces.row(2 * f)) << f;
+}
+
 TEST(CornerTable, LeavesNoHalfEdgeTwiceWhateverTheFacesAre) {
   std::mt19937 random(1);
   const auto below = [&](std::uint32_t bound) { return static_cast<std::int32_t>(random() % bound); };
@@ -154,7 +165,7 @@ TEST(CornerTable, LeavesNoHalfEdgeTwiceWhateverTheFacesAre) {
     for (Eigen::Index k = 0; k < mesh.faces.size(); ++k) mesh.faces.data()[k] = below(vertices);
     CornerTable table(mesh);
     for (std::int32_t edge = 0; edge < table.edge_count(); ++edge) {
-      if (!std::isfinite(table.squared_length(edge))) continue;
+      if (table.is_gone(edge)) continue;
       const CornerTable::Way found = table.ways(edge)[below(2)];
       if (table.may_collapse(found, CornerTable::kMostNeighbours, kAnyTurn)) table.collapse(found);
     }

@@ -88,6 +88,17 @@ TEST_P(LbfgsMemoryTest, LeavesOutAStepWithoutCurvature) {
   EXPECT_EQ(d_, -h());
 }
 
+TEST_P(LbfgsMemoryTest, DropsTheOldestPairBeforeItKnowsTheNewOne) {
+  direction(0);
+  for (int step = 0; step < 3; ++step) {
+    walk(0.9);
+    direction(0.9);
+  }
+  memory_.direction(g_, g_, h_, h_, 0.9, d_);  // no curvature
+  const Points expected = -two_loop(g_, 2);
+  EXPECT_LT((d_ - expected).norm(), kSingle * expected.norm());
+}
+
 TEST_P(LbfgsMemoryTest, ForgetsWhenCleared) {
   direction(0);
   walk(0.9);
