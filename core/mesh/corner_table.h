@@ -34,10 +34,10 @@ class CornerTable {
   /// The first way runs as the edge does in the first of its faces. The second runs back. Not of an edge that is gone.
   std::array<Way, 2> ways(std::int32_t edge) const;
 
+  static constexpr int kMostNeighbours = 32;
   /// Whether way.from may become one with way.to: the mesh stays a manifold, boundaries stay boundaries, the two vertices have at most
   /// `most_neighbours` <= kMostNeighbours neighbours together, and the faces that remain turn by no more than the angle with this
   /// cosine. False if the mesh is not a manifold at one of the two vertices.
-  static constexpr int kMostNeighbours = 32;
   bool may_collapse(const Way& way, int most_neighbours, double cosine);
   /// Collapses the way. Call it right after may_collapse(way, ...) has returned true: it uses what that call has found.
   void collapse(const Way& way);

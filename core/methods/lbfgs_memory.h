@@ -36,7 +36,8 @@ class LbfgsMemory {
 
   /// d = -H g; returns <g, d>. `length` > 0 means that the step length * d was made since the last call, at which
   /// gradient and h were gradient_before and h_before. Its pair is then stored, unless <s, y> is not positive to rounding. If there are
-  /// `most_pairs` already, the oldest is dropped first, even if the new pair is then not stored. Pass 0 if no step was made, or after clear(); then d = -gamma h.
+  /// `most_pairs` already, the oldest is dropped first, even if the new pair is then not stored. Pass 0 if no step was made, or after
+  /// clear(); then d = -gamma h.
   double direction(const Points& gradient, const Points& gradient_before, const SinglePoints& h,
                    const SinglePoints& h_before, double length, Points& d);
 
