@@ -20,19 +20,31 @@ CellPass::CellPass(std::shared_ptr<const RestShape> shape, Workers workers)
       c_(shape_->vertex_count(), 0.0),
       chunk_sums_((shape_->vertex_count() + kChunk - 1) / kChunk) {}
 
-void CellPass::set_bending(double share) {
-  bending_ = share;
-  if (share < 1 && !membrane_) membrane_.emplace(shape_, workers_);
-  if (share >= 1) membrane_.reset();
-  bent_c_.resize(membrane_ ? c_.size() : 0);
-  bent_c_.shrink_to_fit();
+void CellPass::set_bending(const Field& shares) {
+  const bool has_all_faces = membrane_ && bending_.size() == 1;
+  bending_ = shares;
+  if ((shares.array() >= 1).all()) {
+    membrane_.reset();
+  } else if (shares.size() > 1) {
+    std::vector<char> bends(shares.size());
+    for (std::size_t i = 0; i < bends.size(); ++i) bends[i] = bending(i) < 1 ? 1 : 0;
+    membrane_.emplace(shape_, workers_, bends);
+  } else if (!has_all_faces) {
+    membrane_.emplace(shape_, workers_);
+  }
+  for (std::vector<double>* weights : {&bent_c_, &stretched_c_}) {
+    weights->resize(membrane_ ? c_.size() : 0);
+    weights->shrink_to_fit();
+  }
 }
 
 /// Makes the E_i^2 of cells begin to end - 1, as Eq. 2 has them, those of set_bending().
 void CellPass::replace_bending(std::size_t begin, std::size_t end) const {
   for (std::size_t i = begin; i < end; ++i) {
+    const double share = bending(i);
+    if (share >= 1) continue;
     const double stretching = membrane_->share(static_cast<std::int32_t>(i));
-    state_.squared[i] = bending_ * state_.squared[i] + (1 - bending_) * stretching;
+    state_.squared[i] = share * state_.squared[i] + (1 - share) * stretching;
   }
 }
 
@@ -97,15 +109,17 @@ double CellPass::sum(const LpNorm& norm) const {
 
 void CellPass::gradient(Points& result) const {
   result.resize(shape_->vertex_count(), 3);
-  if (membrane_)
-    std::transform(c_.begin(), c_.end(), bent_c_.begin(), [this](double c) { return bending_ * c; });
+  for (std::size_t i = 0; i < bent_c_.size(); ++i) {
+    bent_c_[i] = bending(i) * c_[i];
+    stretched_c_[i] = (1 - bending(i)) * c_[i];
+  }
   const std::vector<double>& c = membrane_ ? bent_c_ : c_;
   workers_.for_chunks(c_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     gradient_of_blocks(blocks_, begin / kLanes, (end + kLanes - 1) / kLanes, state_, c.data(), result.data());
   });
   if (!membrane_) return;
   workers_.for_chunks(c_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
-    membrane_->add_gradient(1 - bending_, c_, begin, end, result);
+    membrane_->add_gradient(stretched_c_, begin, end, result);
   });
 }
 
@@ -133,7 +147,9 @@ std::vector<Eigen::Matrix3d> CellPass::rotations() const {
 
 std::size_t CellPass::memory_bytes() const {
   return blocks_.memory_bytes() + state_.memory_bytes() + (membrane_ ? membrane_->memory_bytes() : 0) +
-         (rows_.capacity() + c_.capacity() + bent_c_.capacity() + chunk_sums_.capacity()) * sizeof(double);
+         (rows_.capacity() + c_.capacity() + bent_c_.capacity() + stretched_c_.capacity() + bending_.size() +
+          chunk_sums_.capacity()) *
+             sizeof(double);
 }
 
 }  // namespace lpdeform

@@ -30,15 +30,16 @@ class CellPass {
  public:
   CellPass(std::shared_ptr<const RestShape> shape, Workers workers);
 
-  /// Only for coarse levels: from the next evaluation on, cells keep the share b of their resistance to bending, 0 < b <= 1,
-  /// and all of their resistance to stretching. With b < 1,
+  /// Only for coarse levels: from the next evaluation on, cell i keeps the share b_i of its resistance to bending, 0 < b_i <= 1,
+  /// and all of its resistance to stretching. With b_i < 1,
   ///
-  ///   E_i^2 = b (Eq. 2) + (1 - b) / 3 sum_{faces T at i} E_T^2        (membrane.h)
+  ///   E_i^2 = b_i (Eq. 2) + (1 - b_i) / 3 sum_{faces T at i} E_T^2        (membrane.h)
   ///
-  /// A cell's resistance to bending grows as the square of its edges, beside that to stretching. A coarse level with b =
-  /// its vertices / those of the fine level therefore bends like the fine level. Not for uniform weights, whose cells are
-  /// in other units than faces.
-  void set_bending(double share);
+  /// A cell's resistance to bending grows as the square of its edges, beside that to stretching. A coarse level with b_i =
+  /// its vertices / those of the fine level there therefore bends like the fine level. One share for all cells, or one for each.
+  /// Not for uniform weights, whose cells are in other units than faces.
+  void set_bending(const Field& shares);
+  void set_bending(double share) { set_bending(Field::Constant(1, share)); }
 
   /// f at x, all rotations fitted.
   double evaluate(const Points& x, const LpNorm& norm);
@@ -74,10 +75,12 @@ class CellPass {
   Workers workers_;
   CellBlocks blocks_;
   mutable BlockState state_;  // its rotations are made when first needed after an evaluation
-  double bending_ = 1;
-  std::optional<Membrane> membrane_;    // if bending_ < 1
-  mutable std::vector<double> bent_c_;  // bending_ c_i, if bending_ < 1
-  std::vector<double> rows_;            // x, with fillers
+  double bending(std::size_t i) const { return bending_[bending_.size() == 1 ? 0 : i]; }
+
+  Field bending_ = Field::Ones(1);
+  std::optional<Membrane> membrane_;                  // if some b_i < 1
+  mutable std::vector<double> bent_c_, stretched_c_;  // b_i c_i and (1 - b_i) c_i, if some b_i < 1
+  std::vector<double> rows_;                          // x, with fillers
   std::vector<double> c_;
   mutable std::vector<double> chunk_sums_;
 };

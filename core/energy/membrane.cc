@@ -10,11 +10,26 @@ namespace {
 
 constexpr std::size_t kChunk = 1024;  // faces
 
+/// The faces at marked vertices.
+std::optional<Faces> faces_at(const Faces& all, const std::vector<char>& cells) {
+  if (cells.empty()) return std::nullopt;
+  std::vector<Eigen::Index> found;
+  for (Eigen::Index t = 0; t < all.rows(); ++t) {
+    if (cells[all(t, 0)] != 0 || cells[all(t, 1)] != 0 || cells[all(t, 2)] != 0) found.push_back(t);
+  }
+  Faces result(static_cast<Eigen::Index>(found.size()), 3);
+  for (std::size_t k = 0; k < found.size(); ++k) result.row(static_cast<Eigen::Index>(k)) = all.row(found[k]);
+  return result;
+}
+
 }  // namespace
 
-Membrane::Membrane(std::shared_ptr<const RestShape> shape, const Workers& workers)
-    : shape_(std::move(shape)), faces_(static_cast<std::size_t>(shape_->face_count())) {
-  const Faces& faces = shape_->faces();
+Membrane::Membrane(std::shared_ptr<const RestShape> shape, const Workers& workers,
+                   const std::vector<char>& cells)
+    : shape_(std::move(shape)),
+      some_(faces_at(shape_->faces(), cells)),
+      faces_(static_cast<std::size_t>(corners().rows())) {
+  const Faces& faces = corners();
   const Points& rest = shape_->scaled_positions();
   const auto count = static_cast<std::size_t>(faces.rows());
   workers.for_chunks(count, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
@@ -36,47 +51,48 @@ Membrane::Membrane(std::shared_ptr<const RestShape> shape, const Workers& worker
     for (int c = 0; c < 3; ++c) ++offsets_[faces(t, c) + 1];
   }
   for (std::size_t i = 1; i < offsets_.size(); ++i) offsets_[i] += offsets_[i - 1];
-  corners_.resize(3 * count);
+  places_.resize(3 * count);
   std::vector<std::int32_t> next(offsets_.begin(), offsets_.end() - 1);
   for (Eigen::Index t = 0; t < faces.rows(); ++t) {
-    for (int c = 0; c < 3; ++c) corners_[next[faces(t, c)]++] = static_cast<std::int32_t>(3 * t + c);
+    for (int c = 0; c < 3; ++c) places_[next[faces(t, c)]++] = static_cast<std::int32_t>(3 * t + c);
   }
 }
 
 void Membrane::evaluate(const double* rows, const Workers& workers) {
-  workers.for_chunks(static_cast<std::size_t>(shape_->face_count()), kChunk,
+  workers.for_chunks(static_cast<std::size_t>(corners().rows()), kChunk,
                      [&](std::size_t, std::size_t begin, std::size_t end) {
-                       evaluate_faces(shape_->faces(), begin, end, rows, faces_);
+                       evaluate_faces(corners(), begin, end, rows, faces_);
                      });
 }
 
 double Membrane::share(std::int32_t i) const {
   double sum = 0;
-  for (std::int32_t k = offsets_[i]; k < offsets_[i + 1]; ++k) sum += faces_.squared[corners_[k] / 3];
+  for (std::int32_t k = offsets_[i]; k < offsets_[i + 1]; ++k) sum += faces_.squared[places_[k] / 3];
   return sum / 3;
 }
 
-void Membrane::add_gradient(double factor, const std::vector<double>& c, std::size_t begin, std::size_t end,
+void Membrane::add_gradient(const std::vector<double>& c, std::size_t begin, std::size_t end,
                             Points& result) const {
   using Row = double __attribute__((vector_size(kRow * sizeof(double))));
   using SingleRow = float __attribute__((vector_size(kRow * sizeof(float)), aligned(sizeof(float))));
-  const Faces& faces = shape_->faces();
+  const Faces& faces = corners();
   for (std::size_t i = begin; i < end; ++i) {
     Row sum{};
     for (std::int32_t k = offsets_[i]; k < offsets_[i + 1]; ++k) {
-      const std::int32_t t = corners_[k] / 3, corner = corners_[k] % 3;
+      const std::int32_t t = places_[k] / 3, corner = places_[k] % 3;
       const double weight = c[faces(t, 0)] + c[faces(t, 1)] + c[faces(t, 2)];
       const auto* const of = reinterpret_cast<const SingleRow*>(faces_.derivatives.data() +
                                                                 2 * kRow * static_cast<std::size_t>(t));
       const SingleRow own = corner == 0 ? -of[0] - of[1] : of[corner - 1];
       sum += weight * __builtin_convertvector(own, Row);
     }
-    for (int e = 0; e < 3; ++e) result(static_cast<Eigen::Index>(i), e) += factor / 3 * sum[e];
+    for (int e = 0; e < 3; ++e) result(static_cast<Eigen::Index>(i), e) += sum[e] / 3;
   }
 }
 
 std::size_t Membrane::memory_bytes() const {
-  return faces_.memory_bytes() + (offsets_.capacity() + corners_.capacity()) * sizeof(std::int32_t);
+  return faces_.memory_bytes() + (offsets_.capacity() + places_.capacity()) * sizeof(std::int32_t) +
+         (some_ ? some_->size() * sizeof(std::int32_t) : 0);
 }
 
 }  // namespace lpdeform

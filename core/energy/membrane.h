@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/base/workers.h"
@@ -19,22 +20,26 @@ namespace lpdeform {
 /// caller at a time.
 class Membrane {
  public:
-  Membrane(std::shared_ptr<const RestShape> shape, const Workers& workers);
+  /// Has the faces at vertices that are marked in `cells`, which has one mark for each vertex; all faces if it has none.
+  Membrane(std::shared_ptr<const RestShape> shape, const Workers& workers,
+           const std::vector<char>& cells = {});
 
   /// All E_T^2 and their derivatives where the vertices are at `rows`: x, y, z and a filler for each.
   void evaluate(const double* rows, const Workers& workers);
-  /// A third of the sum of E_T^2 over the faces at vertex i.
+  /// A third of the sum of E_T^2 over the faces at vertex i. Of a vertex that is not marked, some faces may be missing.
   double share(std::int32_t i) const;
-  /// Adds factor * sum_T (c_a + c_b + c_c) / 3 dE_T^2/dx to rows begin to end - 1 of `result`, (a, b, c) = T.
-  void add_gradient(double factor, const std::vector<double>& c, std::size_t begin, std::size_t end,
-                    Points& result) const;
+  /// Adds sum_T (c_a + c_b + c_c) / 3 dE_T^2/dx to rows begin to end - 1 of `result`, (a, b, c) = T.
+  void add_gradient(const std::vector<double>& c, std::size_t begin, std::size_t end, Points& result) const;
 
   std::size_t memory_bytes() const;
 
  private:
+  const Faces& corners() const { return some_ ? *some_ : shape_->faces(); }
+
   std::shared_ptr<const RestShape> shape_;
+  std::optional<Faces> some_;  // the faces, unless it has all
   MembraneFaces faces_;
-  std::vector<std::int32_t> offsets_, corners_;  // of each vertex: 3 * face + corner
+  std::vector<std::int32_t> offsets_, places_;  // of each vertex: 3 * face + corner
 };
 
 }  // namespace lpdeform

@@ -14,12 +14,13 @@ constexpr int kMostNeighbours = 14;   // of the two ends of a collapsed edge tog
 constexpr double kLargestTurn = 0.5;  // the cosine
 
 /// One round; `left` counts vertices.
-void collapse_up_to(CornerTable& table, double longest, std::int32_t vertices, std::int32_t& left,
-                    std::vector<std::int32_t>& went_into) {
+void collapse_up_to(CornerTable& table, double longest, std::int32_t vertices, const std::vector<char>& stays,
+                    std::int32_t& left, std::vector<std::int32_t>& went_into) {
   for (std::int32_t edge = 0; edge < table.edge_count(); ++edge) {
     if (left <= vertices) return;
     if (table.is_gone(edge) || table.squared_length(edge) > longest * longest) continue;
     for (const CornerTable::Way& way : table.ways(edge)) {
+      if (!stays.empty() && stays[way.from] != 0) continue;
       if (!table.may_collapse(way, kMostNeighbours, kLargestTurn)) continue;
       went_into[way.from] = way.to;
       table.collapse(way);
@@ -29,7 +30,8 @@ void collapse_up_to(CornerTable& table, double longest, std::int32_t vertices, s
   }
 }
 
-std::vector<std::int32_t> collapse(CornerTable& table, std::int32_t all, std::int32_t vertices) {
+std::vector<std::int32_t> collapse(CornerTable& table, std::int32_t all, std::int32_t vertices,
+                                   const std::vector<char>& stays) {
   std::vector<std::int32_t> went_into(all);
   std::iota(went_into.begin(), went_into.end(), 0);
   std::vector<double> lengths(table.edge_count());
@@ -42,7 +44,7 @@ std::vector<std::int32_t> collapse(CornerTable& table, std::int32_t all, std::in
   std::int32_t left = all;
   for (int idle = 0; left > vertices && idle < 8; longest *= kGrowth) {
     const std::int32_t before = left;
-    collapse_up_to(table, longest, vertices, left, went_into);
+    collapse_up_to(table, longest, vertices, stays, left, went_into);
     idle = before - left > left / 100 ? 0 : idle + 1;
   }
   return went_into;
@@ -56,10 +58,10 @@ std::size_t CoarseMesh::memory_bytes() const {
              sizeof(std::int32_t);
 }
 
-CoarseMesh coarsen(const TriangleMesh& mesh, std::int32_t vertices) {
+CoarseMesh coarsen(const TriangleMesh& mesh, std::int32_t vertices, const std::vector<char>& stays) {
   CornerTable table(mesh);
   std::vector<std::int32_t> went_into =
-      collapse(table, static_cast<std::int32_t>(mesh.vertices.rows()), vertices);
+      collapse(table, static_cast<std::int32_t>(mesh.vertices.rows()), vertices, stays);
   for (std::int32_t& into : went_into) {
     while (into != went_into[into]) into = went_into[into];
   }

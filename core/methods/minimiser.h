@@ -75,6 +75,9 @@ class Minimiser {
   /// satisfied. problem.objective then holds the evaluation there. Calling this does not change steps or their results. With
   /// `is_last` the answer depends on the steps alone, not on earlier calls or the time.
   virtual std::optional<Points> intermediate_state(bool /*is_last*/) { return std::nullopt; }
+
+  /// What levels that end with the solve hold at present.
+  virtual std::size_t level_bytes() const { return 0; }
 };
 
 /// Restricts `values`, a gradient or a direction, to what the constraints allow: rows of held vertices become zero, and

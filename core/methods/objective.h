@@ -17,7 +17,7 @@ class Objective {
       : cells_(std::move(shape), std::move(workers)) {}
 
   /// CellPass::set_bending.
-  void set_bending(double share) { cells_.set_bending(share); }
+  void set_bending(const Field& shares) { cells_.set_bending(shares); }
   void set_soft_terms(SoftTerms terms) { soft_ = std::move(terms); }
 
   /// f at x, all rotations fitted.

@@ -12,7 +12,7 @@ namespace lpdeform {
 enum class Warmth {
   kCold,        // an initial guess
   kPrepared,    // the result of a coarse level
-  kWarm,        // warm start: the state of the previous solve, in a live session
+  kWarm,        // warm start: the state of the previous solve, in a live session; or that of a graded level
   kWithMetric,  // a warm start that also keeps the previous solve's metric
 };
 

@@ -117,7 +117,7 @@ absl::Status CoarseLevel::restrict_inputs(const FineInputs& fine) {
 absl::Status CoarseLevel::take_over(const FineInputs& fine) {
   led_to_.reset();
   alone_from_.reset();
-  solver_->set_bending(fine.bending);
+  solver_->set_bending(Field::Constant(1, fine.bending));
   return restrict_inputs(fine);
 }
 
@@ -182,12 +182,11 @@ void CoarseLevel::go_alone(const Points& x) {
 /// Moves the coarse levels as the fine level, which is at `x` now, has moved since go_alone().
 bool CoarseLevel::catch_up(const FineInputs& fine, const Points& x) {
   const Points by = at_coarse_vertices(x) - *alone_from_;
-  const double unit = fine.shape.mean_edge_length();
   if (has_level_below()) {
-    solver_->displace(unit * by);
+    solver_->displace(fine.shape.mean_edge_length() * by);
   } else {
     const Points from = led_to_ ? led_to_->positions : pose(fine.shape).positions;
-    if (!solver_->set_positions((unit * (from + by)).rowwise() + fine.shape.centre()).ok()) return false;
+    if (!set_state(fine.shape, from + by).ok()) return false;
   }
   led_to_.reset();
   return true;
@@ -198,9 +197,13 @@ absl::Status CoarseLevel::go_to(const FineInputs& fine, const Points& x) {
   alone_from_.reset();
   absl::Status status = restrict_inputs(fine);
   bend_like_fine();
-  status.Update(solver_->set_positions((at_coarse_vertices(x) * fine.shape.mean_edge_length()).rowwise() +
-                                       fine.shape.centre()));
+  status.Update(set_state(fine.shape, at_coarse_vertices(x)));
   return status;
+}
+
+/// Sets the solver's positions, given in scaled units of the fine shape.
+absl::Status CoarseLevel::set_state(const RestShape& fine, const Points& positions) {
+  return solver_->set_positions((positions * fine.mean_edge_length()).rowwise() + fine.centre());
 }
 
 Points CoarseLevel::at_coarse_vertices(const Points& x) const {
@@ -265,7 +268,7 @@ bool CoarseLevel::can_bend_like_fine() const {
 
 void CoarseLevel::bend_like_fine() {
   const double ratio = static_cast<double>(fine_vertex_.size()) / static_cast<double>(coarse_vertex_.size());
-  solver_->set_bending(bending_ * ratio);
+  solver_->set_bending(Field::Constant(1, bending_ * ratio));
 }
 
 std::size_t CoarseLevel::memory_bytes() const {

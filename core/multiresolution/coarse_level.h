@@ -88,6 +88,8 @@ class CoarseLevel {
   std::size_t memory_bytes() const;
 
  private:
+  friend class GradedLevel;  // is such a level, but for where its vertices are
+
   /// A coarse state: positions in scaled units of the fine shape, and the fitted rotations of the cells.
   struct Pose {
     Points positions;
@@ -102,6 +104,7 @@ class CoarseLevel {
   void find_guides(const RestShape& fine);
   absl::Status restrict_inputs(const FineInputs& fine);
   Points at_coarse_vertices(const Points& x) const;
+  absl::Status set_state(const RestShape& fine, const Points& positions);
   bool catch_up(const FineInputs& fine, const Points& x);
   int most_iterations(const Material& material) const;
   bool go_to_handles(int most_iterations, std::stop_token stop);

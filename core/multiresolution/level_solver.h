@@ -20,12 +20,13 @@ class LevelSolver {
   virtual ~LevelSolver() = default;
 
   virtual absl::Status set_material(const Material& material) = 0;
-  virtual void set_bending(double share) = 0;
+  virtual void set_bending(const Field& shares) = 0;
   virtual void displace(const Points& by) = 0;
   virtual std::optional<double> least_energy(std::stop_token stop) = 0;
   virtual absl::Status set_handles(const HandleSet& handles) = 0;
   virtual absl::Status set_positions(const Points& positions) = 0;
   virtual absl::Status start(const SolveSettings& settings, std::stop_token stop) = 0;
+  virtual absl::Status start_prepared(const SolveSettings& settings, std::stop_token stop) = 0;
   virtual bool step() = 0;
   virtual void catch_up(bool is_last) = 0;
   virtual int iterations() const = 0;  // of the running or the last solve

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 namespace lpdeform {
@@ -19,17 +20,32 @@ constexpr double kLowestTolerance = 1e-4;       // on the lowest level of those,
 /// in worse minima when all levels bend like the finest.
 constexpr double kGentleStrain = 0.02;
 
+/// Fine iterations before the graded level, if no p_i is above 2. They take the kinks of the prolongation away, and often they are all
+/// that is needed. At a larger p the graded level comes first.
+constexpr int kFirstFine = 10;
+constexpr double kGradedTolerance = 1e-3;  // relative, of E^(1/p) on the graded level
+constexpr double kGradedToleranceAtLargeP =
+    3e-3;  // if some p_i > 2: iterations are dear, because it is larger
+/// E^(1/p) with which the fine level goes on from the graded one, over that before: the first iterations take kinks away.
+constexpr double kMostAfterGraded = 1.1;
+
 constexpr int kCostOfLook = 5;  // looking at the coarse level takes at most one part in this many of the time
 
 }  // namespace
 
-Multiresolution::Multiresolution(Problem problem, Points x, CoarseLevel& level, int effort)
-    : problem_(std::move(problem)), x_(std::move(x)), level_(level), is_search_(effort != 0) {
+Multiresolution::Multiresolution(Problem problem, Points x, CoarseLevel& level, int effort,
+                                 std::optional<Grading> grading)
+    : problem_(std::move(problem)),
+      x_(std::move(x)),
+      level_(level),
+      is_search_(effort != 0),
+      grading_(std::move(grading)) {
   objective_ = problem_.objective.reweigh(problem_.norm);
   SolveSettings settings;
   settings.initial = InitialGuess::kLaplacian;
   if (level_.can_bend_like_fine() && level_.has_level_below() && !is_search_ && is_gentle()) {
     is_eased_ = true;
+    grading_.reset();
     level_.bend_like_fine();
   }
   settings.tolerance = std::max(problem_.tolerance, first_tolerance());
@@ -62,13 +78,18 @@ double Multiresolution::first_tolerance() const {
 /// The prolonged result of the coarse level, moved to satisfy the constraints. Not always finite.
 Points Multiresolution::prolonged() {
   Points found = level_.prolong(problem_.shape(), problem_.workers());
+  make_feasible(found);
+  if (found.allFinite()) even_out(found);
+  return found;
+}
+
+/// Moves a state to satisfy the constraints. Not always finite.
+void Multiresolution::make_feasible(Points& found) const {
   for (Eigen::Index i = 0; i < found.rows(); ++i) {
     if (problem_.constraints.is_held[i]) found.row(i) = problem_.constraints.targets.row(i);
   }
   if (found.allFinite())
     problem_.constraints.linear.satisfy_within(problem_.metric, found, problem_.workers());
-  if (found.allFinite()) even_out(found);
-  return found;
 }
 
 /// Blended rigid motions leave kinks. One local/global step at p = 2 smooths them, with the metric of equal weights
@@ -85,13 +106,14 @@ void Multiresolution::even_out(Points& found) const {
 
 std::optional<Points> Multiresolution::intermediate_state(bool is_last) {
   if (fine_) return std::nullopt;
-  const int done = level_.solver().iterations();
+  LevelSolver& solver = graded_ ? graded_->solver() : level_.solver();
+  const int done = solver.iterations();
   const auto begun = std::chrono::steady_clock::now();
   const bool is_due = done != looked_at_ && begun >= next_look_;
   if ((done < kFirstLook && !goes_on_) || !(is_due || is_last)) return std::nullopt;
   looked_at_ = done;
-  level_.solver().catch_up(is_last);
-  Points found = prolonged();
+  solver.catch_up(is_last);
+  Points found = graded_ ? moved_with_graded() : prolonged();
   const bool is_good = found.allFinite();
   if (is_good) problem_.objective.evaluate(found, problem_.norm);
   const auto now = std::chrono::steady_clock::now();
@@ -113,8 +135,58 @@ bool Multiresolution::begin_to_ease() {
   return level_.solver().start(settings, problem_.stop).ok();
 }
 
-/// Starts QuasiNewton from the better of the guess and the result of the coarse level.
-void Multiresolution::begin_fine() {
+/// Begins a graded level from x, if there is to be one. False if not.
+bool Multiresolution::begin_graded() {
+  if (!grading_) return false;
+  const Grading grading = *std::exchange(grading_, std::nullopt);
+  objective_ = problem_.objective.evaluate(x_, problem_.norm);
+  const FineInputs inputs{problem_.shape(), grading.handles, problem_.constraints, grading.material, 1};
+  graded_ = GradedLevel::create(level_, inputs, x_, problem_.objective.cells().squared_energies(),
+                                problem_.norm.highest_p(), grading.make_solver);
+  looked_at_ = 0;
+  const double tolerance = problem_.norm.highest_p() > 2 ? kGradedToleranceAtLargeP : kGradedTolerance;
+  if (graded_ && graded_->start(std::max(problem_.tolerance, tolerance), problem_.stop).ok()) return true;
+  graded_.reset();
+  return false;
+}
+
+/// Lets a graded level go on from the fine state, if there is to be one and it is time for it.
+void Multiresolution::leave_fine() {
+  if (!grading_ || fine_iterations_ < kFirstFine) return;
+  x_ = fine_->x();
+  fine_.reset();  // it would take memory beside the graded level
+  stages_before_ = stage_ + 1;
+  if (!begin_graded()) fine_ = std::make_unique<QuasiNewton>(problem_, std::move(x_), Warmth::kPrepared);
+}
+
+/// x, moved along with the graded level, and evened out if that lowers its energy. Not always finite.
+Points Multiresolution::moved_with_graded() const {
+  Points found = graded_->moved(problem_.shape(), x_, problem_.workers());
+  make_feasible(found);
+  if (!found.allFinite()) return found;
+  const double objective = problem_.objective.evaluate(found, problem_.norm);
+  Points even = found;
+  even_out(even);
+  if (even.allFinite() && problem_.objective.evaluate(even, problem_.norm) < objective) return even;
+  return found;
+}
+
+/// The fine level goes on from the result of the graded level, unless that is much worse than where it was.
+void Multiresolution::end_graded() {
+  Points found = moved_with_graded();
+  graded_.reset();
+  const double most = std::pow(kMostAfterGraded, problem_.norm.highest_p()) * objective_;
+  const bool is_good = found.allFinite() && problem_.objective.evaluate(found, problem_.norm) < most;
+  if (is_good)
+    x_.swap(found);
+  else
+    problem_.objective.evaluate(x_, problem_.norm);
+  found.resize(0, 3);
+  fine_ = std::make_unique<QuasiNewton>(problem_, std::move(x_), is_good ? Warmth::kWarm : Warmth::kPrepared);
+}
+
+/// Goes on from the better of the guess and the result of the coarse level: on the graded level, if that comes first, or on the fine one.
+void Multiresolution::end_coarse() {
   Points found = prolonged();
   const bool is_better = found.allFinite() && problem_.objective.evaluate(found, problem_.norm) < objective_;
   if (is_better) {
@@ -122,23 +194,33 @@ void Multiresolution::begin_fine() {
   } else {
     problem_.objective.evaluate(x_, problem_.norm);
   }
+  if (!is_better) grading_.reset();
+  if (problem_.norm.highest_p() > 2 && begin_graded()) return;
   fine_ =
       std::make_unique<QuasiNewton>(problem_, std::move(x_), is_better ? Warmth::kPrepared : Warmth::kCold);
 }
 
 StepResult Multiresolution::step() {
+  if (fine_) leave_fine();
   if (fine_) {
     StepResult result = fine_->step();
-    ++result.stage;  // stage 0 is the coarse level
+    ++fine_iterations_;
+    stage_ = result.stage += stages_before_;
     return result;
   }
-  if (level_.solver().step()) return {Outcome::kProgress, objective_, 0, objective_};
-  if (is_search_ && !is_eased_ && !level_.solver().has_found_lower())
-    return {Outcome::kBreakdown, objective_, 0, objective_};
-  if (begin_to_ease()) return {Outcome::kProgress, objective_, 0, objective_};
-  begin_fine();
+  const StepResult waiting{Outcome::kProgress, objective_, stage_, objective_};
+  if (graded_) {
+    if (graded_->solver().step()) return waiting;
+    end_graded();
+  } else {
+    if (level_.solver().step()) return waiting;
+    if (is_search_ && !is_eased_ && !level_.solver().has_found_lower())
+      return {Outcome::kBreakdown, objective_, 0, objective_};
+    if (begin_to_ease()) return waiting;
+    end_coarse();
+  }
   const double sum = problem_.objective.sum(problem_.norm);
-  return {Outcome::kProgress, sum, 0, sum};
+  return {Outcome::kProgress, sum, stage_, sum};
 }
 
 }  // namespace lpdeform

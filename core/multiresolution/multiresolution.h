@@ -7,8 +7,16 @@
 #include "core/methods/minimiser.h"
 #include "core/methods/quasi_newton.h"
 #include "core/multiresolution/coarse_level.h"
+#include "core/multiresolution/graded_level.h"
 
 namespace lpdeform {
+
+/// What a graded level takes.
+struct Grading {
+  const HandleSet& handles;
+  Material material;  // as FineInputs::material
+  MakeLevelSolver make_solver;
+};
 
 /// Solves the coarse level first, by any method that suits it (which may include a level below it), then runs
 /// QuasiNewton from the prolonged result. On large meshes the coarse level is solved as it is, which finds the better
@@ -17,19 +25,24 @@ namespace lpdeform {
 /// the beginning; only the lowest is first solved with the bending of the level above it. The long way along a curved valley
 /// is travelled where an iteration costs least.
 ///
-/// One iteration of the coarse level counts as one iteration here. Until the coarse level has ended, the state is the
-/// initial guess. If the prolonged result is not better than the initial guess, QuasiNewton starts from the guess.
+/// On very large meshes a graded level goes on after some fine iterations, unless the handles have moved little, and the fine level
+/// after that.
+///
+/// One iteration of the coarse or the graded level counts as one iteration here. Until the coarse level has ended, the state is the
+/// initial guess; while the graded level runs, the fine state before. If the prolonged result is not better than the initial guess, QuasiNewton starts from the guess.
 /// The convergence criterion is that of QuasiNewton.
 class Multiresolution : public Minimiser {
  public:
   /// `level` must already have the handles and the material (take_over), and must outlive this object. If `effort` is not 0,
   /// the coarse level looks for lower minima with this effort (SolveSettings::effort); unless it finds one, the outcome is
-  /// kBreakdown and the fine level is not begun.
-  Multiresolution(Problem problem, Points x, CoarseLevel& level, int effort);
+  /// kBreakdown and the fine level is not begun. Without `grading` there is no graded level.
+  Multiresolution(Problem problem, Points x, CoarseLevel& level, int effort,
+                  std::optional<Grading> grading = std::nullopt);
 
   StepResult step() override;
   const Points& x() const override { return fine_ ? fine_->x() : x_; }
-  /// The prolonged state of the coarse level. This costs about as much as two iterations, so there is a new one only
+  std::size_t level_bytes() const override { return graded_ ? graded_->memory_bytes() : 0; }
+  /// The prolonged state of the coarse or the graded level. This costs about as much as two iterations, so there is a new one only
   /// when four times that time has passed since the previous one, or if it is the last.
   std::optional<Points> intermediate_state(bool is_last) override;
 
@@ -39,9 +52,14 @@ class Multiresolution : public Minimiser {
   bool is_gentle() const;
   double first_tolerance() const;
   Points prolonged();
+  void make_feasible(Points& found) const;
   void even_out(Points& found) const;
   bool begin_to_ease();
-  void begin_fine();
+  bool begin_graded();
+  void leave_fine();
+  Points moved_with_graded() const;
+  void end_graded();
+  void end_coarse();
 
   Problem problem_;
   Points x_;
@@ -52,7 +70,12 @@ class Multiresolution : public Minimiser {
   bool goes_on_ = false;   // it was solved without them first
   int looked_at_ = 0;      // iterations of the coarse level at the last prolongation
   std::chrono::steady_clock::time_point next_look_;
-  std::unique_ptr<QuasiNewton> fine_;  // null while the coarse level runs
+  std::optional<Grading> grading_;       // until there is a graded level, or none is to come
+  std::unique_ptr<GradedLevel> graded_;  // while it runs
+  std::unique_ptr<QuasiNewton> fine_;    // null while another level runs
+  int fine_iterations_ = 0;
+  int stage_ = 0;          // of the last step
+  int stages_before_ = 1;  // those before fine_; stage 0 is the coarse level
 };
 
 }  // namespace lpdeform

@@ -18,6 +18,8 @@ namespace {
 // What a running solve holds, in positions of all vertices: QuasiNewton has 5 states, gradients and directions, and in single precision
 // 2 more and 6 pairs of L-BFGS.
 constexpr std::size_t kWorkspace = 12;
+// The same while a graded level runs.
+constexpr std::size_t kWorkspaceOfLevel = 3;
 // What a Deformer holds besides: x, positions, x_before_move, energies and weights.
 constexpr std::size_t kStates = 4;
 constexpr std::size_t kCellBytes = 60, kEdgeBytes = 30;  // of CellPass: per vertex, per directed edge
@@ -105,12 +107,12 @@ absl::Status Deformer::set_handles(const HandleSet& handles) {
   return absl::OkStatus();
 }
 
-void Deformer::set_bending(double share) {
+void Deformer::set_bending(const Field& shares) {
   impl_->change_inputs();
-  if (share == impl_->bending) return;
-  impl_->bending = share;
+  if (shares == impl_->bending) return;
+  impl_->bending = shares;
   impl_->lead = Impl::Lead::kNone;
-  impl_->objective.set_bending(share);
+  impl_->objective.set_bending(shares);
 }
 
 absl::Status Deformer::set_material(const Material& material) {
@@ -156,7 +158,16 @@ absl::Status Deformer::start(const SolveSettings& settings, std::stop_token stop
   if (!self.constraints) return no_handles();
   if (absl::Status status = check_method_takes(settings.method, self.handles); !status.ok()) return status;
   self.interrupt();
-  self.begin(settings, std::move(stop));
+  self.begin(settings, std::move(stop), false);
+  return absl::OkStatus();
+}
+
+absl::Status Deformer::start_prepared(const SolveSettings& settings, std::stop_token stop) {
+  Impl& self = *impl_;
+  if (absl::Status status = check_settings(settings, self.material); !status.ok()) return status;
+  if (!self.constraints) return no_handles();
+  self.interrupt();
+  self.begin(settings, std::move(stop), true);
   return absl::OkStatus();
 }
 
@@ -267,7 +278,9 @@ std::vector<Eigen::Matrix3d> Deformer::rotations() {
 }
 
 std::size_t Deformer::memory_bytes() const {
-  return idle_memory_bytes() + kWorkspace * impl_->x.size() * sizeof(double);
+  const std::size_t points = impl_->x.size() * sizeof(double);
+  const std::size_t levels = impl_->minimiser ? impl_->minimiser->level_bytes() : 0;
+  return idle_memory_bytes() + std::max(kWorkspace * points, kWorkspaceOfLevel * points + levels);
 }
 
 std::size_t Deformer::idle_memory_bytes() const {

@@ -28,6 +28,8 @@ struct DeformerOptions {
   std::int32_t search_up_to = 15000;  // vertices
   /// The search of a solve keeps the first minimum unless another one saves at least this share of the energy.
   double least_saving = 0;
+  /// Cold solves of meshes of this size have a graded level between the coarse and the fine one (GradedLevel).
+  std::int32_t graded_from = 200000;  // vertices
   /// Admission control: called once with the memory that a solve takes, before it is allocated. create() returns its
   /// error.
   std::function<absl::Status(std::size_t bytes)> admit = {};
@@ -60,10 +62,10 @@ class Deformer {
   /// Replaces the material. Errors: as check_material. Ends a running solve with kCancelled.
   absl::Status set_material(const Material& material);
 
-  /// Only for coarse levels: cells keep this share of their resistance to bending (CellPass::set_bending), 0 < share <= 1.
-  /// If it is not 1, energies are not those of Eq. 2, and neither certificates nor any method but kQuasiNewton and
+  /// Only for coarse levels: cells keep these shares of their resistance to bending (CellPass::set_bending), 0 < share <= 1.
+  /// If they are not all 1, energies are not those of Eq. 2, and neither certificates nor any method but kQuasiNewton and
   /// kMultiresolution may be asked for. Ends a running solve with kCancelled.
-  void set_bending(double share);
+  void set_bending(const Field& shares);
 
   /// Makes `positions` the current state, from which InitialGuess::kCurrent starts. Errors: as check_positions.
   /// Ends a running solve with kCancelled.
@@ -79,6 +81,9 @@ class Deformer {
   /// METHOD_NEEDS_EXACT_HANDLES, TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE). `stop` is
   /// checked in every iteration.
   absl::Status start(const SolveSettings& settings, std::stop_token stop = {});
+  /// Only for coarse levels: the same from positions(), as from the result of a coarse level (Warmth::kPrepared), with held vertices at
+  /// their targets. settings.initial does not matter.
+  absl::Status start_prepared(const SolveSettings& settings, std::stop_token stop = {});
 
   /// Makes one iteration, or one step of a certificate. True while there is more to do; false when the summary is
   /// complete.

@@ -184,7 +184,7 @@ Points Deformer::Impl::current_guess() {
     x_before_move = x;
     return x;
   }
-  const bool can_lead = warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, bending);
+  const bool can_lead = warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, least_bending());
   const bool had_no_time = std::exchange(goes_alone, false) && fine_iterations == 0;
   if (had_no_time) moves_to_lead = kMovesToLeadWithoutTime;
   const bool is_to_lead = moves_to_lead > 0;
@@ -218,7 +218,9 @@ Points Deformer::Impl::current_guess() {
 Points Deformer::Impl::initial_guess(InitialGuess guess) {
   is_guess_evaluated = false;
   Points result;
-  if (guess == InitialGuess::kRest)
+  if (warmth == Warmth::kPrepared)
+    result = x;
+  else if (guess == InitialGuess::kRest)
     result = constraints->targets;
   else if (guess == InitialGuess::kCurrent && state != State::kUntouched)
     result = current_guess();

@@ -31,7 +31,7 @@ class DeformerOfLevel : public LevelSolver {
  public:
   explicit DeformerOfLevel(std::unique_ptr<Deformer> deformer) : deformer_(std::move(deformer)) {}
 
-  void set_bending(double share) override { deformer_->set_bending(share); }
+  void set_bending(const Field& shares) override { deformer_->set_bending(shares); }
   void displace(const Points& by) override { deformer_->displace(by); }
   std::optional<double> least_energy(std::stop_token stop) override {
     return deformer_->least_energy(std::move(stop));
@@ -41,6 +41,9 @@ class DeformerOfLevel : public LevelSolver {
   absl::Status set_positions(const Points& positions) override { return deformer_->set_positions(positions); }
   absl::Status start(const SolveSettings& settings, std::stop_token stop) override {
     return deformer_->start(settings, std::move(stop));
+  }
+  absl::Status start_prepared(const SolveSettings& settings, std::stop_token stop) override {
+    return deformer_->start_prepared(settings, std::move(stop));
   }
   bool step() override { return deformer_->step(); }
   void catch_up(bool is_last) override { deformer_->catch_up(is_last); }
@@ -117,26 +120,40 @@ Problem Deformer::Impl::make_problem() {
           stop};
 }
 
+/// Null if the level takes no solver.
+std::unique_ptr<LevelSolver> Deformer::Impl::make_level_solver(std::shared_ptr<const RestShape> level) const {
+  const DeformerOptions of_level{.free_components = FreeComponents::kStay,
+                                 .threads = workers().threads(),
+                                 .search_up_to = kLargestSearchedLevel,
+                                 .least_saving = is_large() ? kLeastSavingOfLevel : 0,
+                                 .graded_from = std::numeric_limits<std::int32_t>::max()};
+  auto deformer = Deformer::create(std::move(level), of_level);
+  return deformer.ok() ? std::make_unique<DeformerOfLevel>(*std::move(deformer)) : nullptr;
+}
+
+/// What a graded level takes, where a solve is to have one.
+std::optional<Grading> Deformer::Impl::grading() const {
+  if (shape->vertex_count() < options.graded_from || shape->weight_kind() == WeightKind::kUniform)
+    return std::nullopt;
+  return Grading{handles, effective_material(), [this](std::shared_ptr<const RestShape> level) {
+                   return make_level_solver(std::move(level));
+                 }};
+}
+
 /// Makes the coarse level if there is none. False if the mesh cannot be coarsened, which is tried once.
 bool Deformer::Impl::make_coarse() {
-  const auto make_solver = [this](std::shared_ptr<const RestShape> level) -> std::unique_ptr<LevelSolver> {
-    const DeformerOptions of_level{.free_components = FreeComponents::kStay,
-                                   .threads = workers().threads(),
-                                   .search_up_to = kLargestSearchedLevel,
-                                   .least_saving = is_large() ? kLeastSavingOfLevel : 0};
-    auto deformer = Deformer::create(std::move(level), of_level);
-    return deformer.ok() ? std::make_unique<DeformerOfLevel>(*std::move(deformer)) : nullptr;
-  };
   if (!coarse && !is_coarsest) {
     CoarseMesh mesh = coarse_mesh ? *std::exchange(coarse_mesh, {}) : CoarseLevel::coarsened(*shape);
-    coarse = CoarseLevel::create(*shape, std::move(mesh), make_solver);
+    coarse = CoarseLevel::create(*shape, std::move(mesh), [this](std::shared_ptr<const RestShape> level) {
+      return make_level_solver(std::move(level));
+    });
     is_coarsest = coarse == nullptr;
   }
   return coarse != nullptr;
 }
 
 FineInputs Deformer::Impl::coarse_inputs(const Material& effective) const {
-  return {*shape, handles, *constraints, effective, bending};
+  return {*shape, handles, *constraints, effective, least_bending()};
 }
 
 /// Makes the coarse level if there is none, and restricts the inputs to it, for a solve that begins there. False if the mesh cannot
@@ -148,7 +165,7 @@ bool Deformer::Impl::prepare_coarse() {
 
 Method Deformer::Impl::chosen_method(Method asked, bool is_warm) {
   if (asked == Method::kAuto) {
-    const std::int32_t large = bending < 1                       ? CoarseLevel::kLeastEasedLevel
+    const std::int32_t large = is_coarse()                       ? CoarseLevel::kLeastEasedLevel
                                : (material.p.array() == 2).all() ? kLargeAtTwo
                                                                  : kLargeMesh;
     asked = is_warm || shape->vertex_count() < large ? Method::kQuasiNewton : Method::kMultiresolution;
@@ -167,7 +184,7 @@ std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points 
     case Method::kConic:
       return std::make_unique<Conic>(std::move(problem), std::move(guess));
     case Method::kMultiresolution:
-      return std::make_unique<Multiresolution>(std::move(problem), std::move(guess), *coarse, 0);
+      return std::make_unique<Multiresolution>(std::move(problem), std::move(guess), *coarse, 0, grading());
     case Method::kAuto:
     case Method::kQuasiNewton:
       break;
@@ -273,7 +290,7 @@ void Deformer::Impl::record(const StepResult& result, double sum) {
       {summary.iterations, summary.solve_seconds, norm->true_energy(sum), result.objective, result.stage});
 }
 
-void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token new_stop) {
+void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token new_stop, bool is_prepared) {
   started = Clock::now();
   settings = new_settings;
   stop = std::move(new_stop);
@@ -284,7 +301,8 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   evaluations_before = objective.evaluations();
   back_substitutions_before = metric.back_substitutions();
   metric_before = metric.version();
-  const bool is_warm = settings.initial == InitialGuess::kCurrent && state == State::kDeformed;
+  const bool is_warm =
+      !is_prepared && settings.initial == InitialGuess::kCurrent && state == State::kDeformed;
   if (!is_warm) {
     x_before_move.resize(0, 3);
     lead = Lead::kNone;
@@ -293,7 +311,10 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   summary.effort = *settings.effort;
   const bool keeps_metric =
       is_warm && factor == Factor::kQuasiNewton && metric.is_factored_for(constraints->is_held);
-  warmth = keeps_metric ? Warmth::kWithMetric : is_warm ? Warmth::kWarm : Warmth::kCold;
+  warmth = keeps_metric  ? Warmth::kWithMetric
+           : is_warm     ? Warmth::kWarm
+           : is_prepared ? Warmth::kPrepared
+                         : Warmth::kCold;
   bool is_factored = false;
   const auto make_coarse = [&] {
     settings.method = summary.method = chosen_method(settings.method, is_warm);

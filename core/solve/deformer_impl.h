@@ -11,6 +11,7 @@
 #include "core/methods/minimiser.h"
 #include "core/methods/quasi_newton.h"
 #include "core/multiresolution/coarse_level.h"
+#include "core/multiresolution/multiresolution.h"
 #include "core/solve/deformer.h"
 
 namespace lpdeform {
@@ -57,6 +58,8 @@ struct Deformer::Impl {
   bool is_best_zero() const;
   Problem make_problem();
   Method chosen_method(Method asked, bool is_warm);
+  std::unique_ptr<LevelSolver> make_level_solver(std::shared_ptr<const RestShape> level) const;
+  std::optional<Grading> grading() const;
   bool make_coarse();
   bool prepare_coarse();
   std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, Warmth warmth);
@@ -69,7 +72,7 @@ struct Deformer::Impl {
   Material effective_material() const;
   void summarise();
   void record(const StepResult& result, double sum);
-  void begin(const SolveSettings& new_settings, std::stop_token new_stop);
+  void begin(const SolveSettings& new_settings, std::stop_token new_stop, bool is_prepared);
   void iterate();
   void settle(StopReason reason);
   void end_minimiser(StopReason reason);
@@ -94,7 +97,8 @@ struct Deformer::Impl {
   /// The factor's weights are not those that quasi_newton left any more.
   void forget_weights() { factor = std::min(factor, Factor::kUsable); }
   /// Whether this is a coarse level that bends like a finer one. Such levels go on together with theirs.
-  bool is_coarse() const { return bending < 1; }
+  bool is_coarse() const { return least_bending() < 1; }
+  double least_bending() const { return bending.minCoeff(); }
   void interrupt() {
     certificate.reset();
     if (search && is_search_apart)
@@ -116,7 +120,7 @@ struct Deformer::Impl {
   std::optional<CoarseMesh> coarse_mesh;  // of `coarse`, where it was made beforehand
   HandleSet handles;
   Material material;
-  double bending = 1;  // see set_bending()
+  Field bending = Field::Ones(1);  // see set_bending()
   std::optional<Constraints> constraints;
   std::shared_ptr<const Points> outside;  // where vertices outside the region are held, in the caller's units
 

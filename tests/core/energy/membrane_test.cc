@@ -104,13 +104,47 @@ TEST(Membrane, GivesTheSameBitsOnAnyNumberOfThreads) {
   EXPECT_EQ(gradients[0], gradients[1]);
 }
 
+/// Shares of 1 for cells of one half of the shape, and other ones for the rest.
+Field graded_shares(const RestShape& shape) {
+  Field shares = Field::Ones(shape.vertex_count());
+  for (Eigen::Index i = 0; i < shares.size(); ++i) {
+    if (shape.scaled_positions()(i, 2) > 0) shares[i] = i % 2 == 0 ? 0.2 : 0.5;
+  }
+  return shares;
+}
+
+TEST(Bending, OfEachCellIsThatOfItsOwnShare) {
+  const auto shape = rest_shape(creature(30));
+  const Points x = shaken(shape->scaled_positions(), 0.2);
+  const Field shares = graded_shares(*shape);
+  CellPass mixed(shape, Workers(1));
+  mixed.set_bending(shares);
+  mixed.evaluate(x, two(shape->vertex_count()));
+  for (const double share : {0.2, 0.5, 1.0}) {
+    CellPass even(shape, Workers(1));
+    even.set_bending(share);
+    even.evaluate(x, two(shape->vertex_count()));
+    int count = 0;
+    for (Eigen::Index i = 0; i < shares.size(); ++i) {
+      if (shares[i] != share) continue;
+      ++count;
+      EXPECT_EQ(mixed.squared_energies()[i], even.squared_energies()[i]) << i;
+    }
+    EXPECT_GT(count, 20);
+  }
+  EXPECT_LT(mixed.memory_bytes(), [&] {
+    CellPass even(shape, Workers(1));
+    even.set_bending(0.2);
+    return even.memory_bytes();
+  }());
+}
+
 class EasedGradient : public testing::TestWithParam<double> {};
 
-TEST_P(EasedGradient, AgreesWithCentralDifferences) {
-  const auto shape = rest_shape(box_surface(2, 2, 3));
-  const LpNorm norm(Material::uniform(GetParam()), shape->vertex_count(), 1, 1);
+void expect_gradient(const std::shared_ptr<const RestShape>& shape, double p, const Field& shares) {
+  const LpNorm norm(Material::uniform(p), shape->vertex_count(), 1, 1);
   CellPass cells(shape, Workers(1));
-  cells.set_bending(0.2);
+  cells.set_bending(shares);
   const Points x = shaken(shape->scaled_positions(), 0.3);
   cells.evaluate(x, norm);
   Points gradient;
@@ -124,6 +158,16 @@ TEST_P(EasedGradient, AgreesWithCentralDifferences) {
       EXPECT_NEAR(gradient(i, c), difference, 1e-7 * size) << "vertex " << i << " coordinate " << c;
     }
   }
+}
+
+TEST_P(EasedGradient, AgreesWithCentralDifferences) {
+  const auto shape = rest_shape(box_surface(2, 2, 3));
+  expect_gradient(shape, GetParam(), Field::Constant(1, 0.2));
+}
+
+TEST_P(EasedGradient, AgreesWithCentralDifferencesWhereCellsHaveTheirOwnShares) {
+  const auto shape = rest_shape(box_surface(2, 2, 3));
+  expect_gradient(shape, GetParam(), graded_shares(*shape));
 }
 
 INSTANTIATE_TEST_SUITE_P(OfEveryP, EasedGradient, testing::Values(1, 1.5, 2, 6));

@@ -36,6 +36,25 @@ TEST(Coarsen, KeepsVerticesOfTheFineMeshAndSaysWhereTheOthersWent) {
   }
 }
 
+TEST(Coarsen, KeepsMarkedVertices) {
+  const TriangleMesh fine = creature(40);
+  std::vector<char> stays(fine.vertices.rows(), 0);
+  std::int32_t marked = 0;
+  for (std::size_t v = 0; v < stays.size(); ++v)
+    marked += stays[v] = fine.vertices(static_cast<Eigen::Index>(v), 0) > 0 ? 1 : 0;
+  const auto rest = static_cast<std::int32_t>(stays.size()) - marked;
+  ASSERT_GT(std::min(marked, rest), 500);
+  const CoarseMesh coarse = coarsen(fine, marked + rest / 6, stays);
+  expect_consistent(coarse, fine);
+  for (std::size_t v = 0; v < stays.size(); ++v) {
+    if (stays[v] != 0) {
+      EXPECT_EQ(coarse.fine_vertex[coarse.coarse_vertex[v]], static_cast<std::int32_t>(v));
+    }
+  }
+  EXPECT_LE(coarse.mesh.vertices.rows(), marked + rest / 5);
+  EXPECT_EQ(check_mesh(coarse.mesh).boundary_loops, 0);
+}
+
 TEST(Coarsen, KeepsTheTopologyOfAClosedSurface) {
   const TriangleMesh fine = block_with_holes(28, 12, 8);
   const CoarseMesh coarse = coarsen(fine, 400);

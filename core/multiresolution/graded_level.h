@@ -1,0 +1,40 @@
+#pragma once
+
+#include <memory>
+#include <stop_token>
+#include <vector>
+
+#include "core/multiresolution/coarse_level.h"
+
+namespace lpdeform {
+
+/// A level between a coarse level and the fine one: all vertices of the fine mesh where the distortion is, and a sixth of them
+/// elsewhere. Most of what the fine level has left to do after a coarse level happens where the distortion is, which is a small part of
+/// the surface (tests/bench/README.md). The rest has to move along, mostly rigidly. Each cell resists bending as the
+/// fine cells that it stands for (CellPass::set_bending). One caller at a time.
+class GradedLevel {
+ public:
+  /// For the fine state x (scaled units), which has the E_i^2 `squared_energies` and which `coarse` has led to. `largest_p` is the
+  /// largest p_i. Null if the distortion is spread so widely that the level would be too large, or if no solver takes it.
+  static std::unique_ptr<GradedLevel> create(const CoarseLevel& coarse, const FineInputs& fine,
+                                             const Points& x, const std::vector<double>& squared_energies,
+                                             double largest_p, const MakeLevelSolver& make_solver);
+
+  /// Begins to solve from x, as after a coarse level. Then call solver().step() until it returns false.
+  absl::Status start(double tolerance, std::stop_token stop);
+  LevelSolver& solver() { return level_->solver(); }
+
+  /// The fine state x, moved along with this level since start(). Fine vertices that this level has are where it has them.
+  /// Held vertices are only about where they are held.
+  Points moved(const RestShape& fine, const Points& x, const Workers& workers) const;
+
+  std::size_t memory_bytes() const { return level_->memory_bytes(); }
+
+ private:
+  GradedLevel(std::unique_ptr<CoarseLevel> level, const RestShape& fine);
+
+  std::unique_ptr<CoarseLevel> level_;
+  CoarseLevel::Pose before_;
+};
+
+}  // namespace lpdeform

@@ -1,0 +1,222 @@
+#include "core/multiresolution/graded_level.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/energy/cell_pass.h"
+#include "tests/core/poses.h"
+
+namespace lpdeform {
+namespace {
+
+/// A closed sheet that is folded at its middle: the rest of it only moves along.
+class GradedLevelTest : public testing::Test {
+ protected:
+  const TriangleMesh mesh = box_surface(4, 36, 144);
+  const std::shared_ptr<const RestShape> shape = rest_shape(mesh);
+
+  HandleSet fold() const {
+    HandleSet handles;
+    (void)handles.set("bottom", {slice(mesh, 2, 0, 62), Fixed{}});
+    (void)handles.set("top", {slice(mesh, 2, 82, 144), turn({1, 0.2, 0}, 80, {2, 18, 72})});
+    return handles;
+  }
+  /// A solver whose cold solves have a graded level, or one whose solves have none.
+  std::unique_ptr<Deformer> solver(const Material& material, bool is_graded, int threads = 1) const {
+    DeformerOptions options{.threads = threads};
+    if (is_graded) options.graded_from = 1000;
+    return deformer(shape, fold(), material, options);
+  }
+  static SolveSettings settings() {
+    SolveSettings result;
+    result.method = Method::kMultiresolution;
+    result.initial = InitialGuess::kLaplacian;
+    result.effort = 0;
+    result.keep_trace = true;
+    return result;
+  }
+};
+
+/// A solver that only keeps what it is given.
+class KeepingSolver : public LevelSolver {
+ public:
+  KeepingSolver(std::shared_ptr<const RestShape> level, Field* bending)
+      : positions_(level->positions()),
+        rotations_(level->vertex_count(), Eigen::Matrix3d::Identity()),
+        bending_(bending) {}
+
+  absl::Status set_material(const Material& /*material*/) override { return absl::OkStatus(); }
+  void set_bending(const Field& shares) override { *bending_ = shares; }
+  void displace(const Points& /*by*/) override {}
+  std::optional<double> least_energy(std::stop_token /*stop*/) override { return std::nullopt; }
+  absl::Status set_handles(const HandleSet& /*handles*/) override { return absl::OkStatus(); }
+  absl::Status set_positions(const Points& positions) override {
+    positions_ = positions;
+    return absl::OkStatus();
+  }
+  absl::Status start(const SolveSettings& /*settings*/, std::stop_token /*stop*/) override {
+    return absl::OkStatus();
+  }
+  absl::Status start_prepared(const SolveSettings& /*settings*/, std::stop_token /*stop*/) override {
+    return absl::OkStatus();
+  }
+  bool step() override { return false; }
+  void catch_up(bool /*is_last*/) override {}
+  int iterations() const override { return 0; }
+  bool has_found_lower() const override { return false; }
+  const Points& positions() const override { return positions_; }
+  const Field& cell_energies() const override { return energies_; }
+  std::vector<Eigen::Matrix3d> rotations() override { return rotations_; }
+  std::size_t memory_bytes() const override { return 0; }
+
+ private:
+  Points positions_;
+  std::vector<Eigen::Matrix3d> rotations_;
+  Field energies_;
+  Field* bending_;
+};
+
+/// While a graded level runs, the fine level waits: its records have the same energy.
+int waiting_records(const SolveSummary& summary) {
+  int result = 0;
+  for (std::size_t k = 1; k < summary.trace.size(); ++k) {
+    if (summary.trace[k].stage > 0 && summary.trace[k].objective == summary.trace[k - 1].objective) ++result;
+  }
+  return result;
+}
+
+TEST_F(GradedLevelTest, RunsAfterTheFirstFineIterations) {
+  for (const double p : {1.0, 1.5, 2.0}) {
+    const SolveSummary with = solver(Material::uniform(p), true)->solve(settings()).value();
+    const SolveSummary without = solver(Material::uniform(p), false)->solve(settings()).value();
+    EXPECT_GT(waiting_records(with), 5) << "p = " << p;
+    EXPECT_LT(waiting_records(without), 5) << "p = " << p;
+  }
+}
+
+/// At a large p it runs before them. Its iterations count.
+TEST_F(GradedLevelTest, RunsBeforeTheFirstFineIterationsAtALargeP) {
+  const auto waits_before = [](const SolveSummary& summary) {
+    return std::count_if(summary.trace.begin(), summary.trace.end(), [&](const IterationRecord& record) {
+      return record.stage == 0 && record.objective < 0.9 * summary.trace.front().objective;
+    });
+  };
+  EXPECT_GT(waits_before(solver(Material::uniform(6), true)->solve(settings()).value()), 5);
+  EXPECT_LT(waits_before(solver(Material::uniform(6), false)->solve(settings()).value()), 5);
+}
+
+TEST_F(GradedLevelTest, EndsWhereASolveWithoutItEndsOrLower) {
+  for (const double p : {1.0, 1.5, 2.0, 6.0}) {
+    const SolveSummary with = solver(Material::uniform(p), true)->solve(settings()).value();
+    const SolveSummary without = solver(Material::uniform(p), false)->solve(settings()).value();
+    EXPECT_EQ(with.stop_reason, StopReason::kConverged) << "p = " << p;
+    EXPECT_LT(std::pow(with.energy / without.energy, 1 / p), 1.005) << "p = " << p;
+  }
+}
+
+TEST_F(GradedLevelTest, GivesTheSameBitsOnAnyNumberOfThreads) {
+  std::vector<Points> results;
+  for (const int threads : {1, 3}) {
+    const auto deformer =
+        Deformer::create(shape, {.threads = threads, .parallel_from = 0, .graded_from = 1000}).value();
+    ASSERT_TRUE(deformer->set_handles(fold()).ok());
+    ASSERT_TRUE(deformer->set_material(Material::uniform(1.5)).ok());
+    (void)deformer->solve(settings());
+    results.push_back(deformer->positions());
+  }
+  EXPECT_EQ(results[0], results[1]);
+}
+
+TEST_F(GradedLevelTest, ALookAtItDoesNotChangeWhatFollows) {
+  const auto alone = solver(Material::uniform(2), true), watched = solver(Material::uniform(2), true);
+  (void)alone->solve(settings());
+  ASSERT_TRUE(watched->start(settings()).ok());
+  while (watched->step()) {
+    watched->catch_up();
+    ASSERT_TRUE(watched->positions().allFinite());
+  }
+  EXPECT_EQ(alone->positions(), watched->positions());
+  EXPECT_EQ(alone->summary().iterations, watched->summary().iterations);
+}
+
+TEST_F(GradedLevelTest, StoppedWhileItRunsASolveHasAStateOfItsEnergy) {
+  const SolveSummary whole = solver(Material::uniform(2), true)->solve(settings()).value();
+  const auto waits = [&](std::size_t k) {
+    return whole.trace[k].stage > 0 && whole.trace[k].objective == whole.trace[k - 1].objective;
+  };
+  std::size_t first = 1;
+  while (first < whole.trace.size() && !waits(first)) ++first;
+  ASSERT_LT(first, whole.trace.size());
+  for (const int more : {0, 3, 8}) {
+    SolveSettings until = settings();
+    until.max_iterations = whole.trace[first].iteration + more;
+    const auto stopped = solver(Material::uniform(2), true);
+    const SolveSummary summary = stopped->solve(until).value();
+    EXPECT_EQ(summary.stop_reason, StopReason::kIterationLimit);
+    EXPECT_NEAR(stopped->cell_energies().squaredNorm(), summary.energy, 1e-9 * summary.energy);
+    EXPECT_LE(summary.energy, whole.trace[first].energy);
+    for (const std::int32_t v : slice(mesh, 2, 0, 62))
+      EXPECT_EQ(stopped->positions().row(v), mesh.vertices.row(v));
+  }
+}
+
+TEST_F(GradedLevelTest, KnowsOtherHandles) {
+  HandleSet handles;
+  ASSERT_TRUE(handles.set("bottom", {slice(mesh, 2, 0, 62), Fixed{}}).ok());
+  Handle soft{slice(mesh, 2, 120, 144), turn({1, 0.2, 0}, 80, {2, 18, 72})};
+  soft.hold = Soft{2};
+  ASSERT_TRUE(handles.set("top", soft).ok());
+  const auto solve = [&](bool is_graded) {
+    DeformerOptions options;
+    if (is_graded) options.graded_from = 1000;
+    return deformer(shape, handles, Material::uniform(2), options)->solve(settings()).value();
+  };
+  EXPECT_LT(std::sqrt(solve(true).energy / solve(false).energy), 1.005);
+}
+
+/// The level itself, below which is a coarse level that has solved the same.
+TEST_F(GradedLevelTest, HasTheVerticesWhereTheDistortionIs) {
+  std::shared_ptr<const RestShape> graded;
+  Field bending;
+  const MakeLevelSolver make = [&](std::shared_ptr<const RestShape> level) -> std::unique_ptr<LevelSolver> {
+    graded = level;
+    return std::make_unique<KeepingSolver>(std::move(level), &bending);
+  };
+  const auto coarse = CoarseLevel::create(*shape, CoarseLevel::coarsened(*shape), make);
+  const Constraints constraints = make_constraints(*shape, fold(), FreeComponents::kError).value();
+  const HandleSet handles = fold();
+  const Material material = Material::uniform(2);
+  const FineInputs inputs{*shape, handles, constraints, material, 1};
+  std::vector<double> squared(shape->vertex_count(), 1e-6);
+  std::int32_t distorted = 0;
+  for (std::size_t v = 0; v < squared.size(); ++v) {
+    if (std::abs(mesh.vertices(static_cast<Eigen::Index>(v), 2) - 72) < 6) squared[v] = 1, ++distorted;
+  }
+  const Points& x = shape->scaled_positions();
+  const auto level = GradedLevel::create(*coarse, inputs, x, squared, 2, make);
+  ASSERT_NE(level, nullptr);
+  EXPECT_GE(graded->vertex_count(), distorted);
+  EXPECT_LT(graded->vertex_count(), shape->vertex_count() / 2);
+  std::int32_t kept = 0;
+  double stands_for = 0;  // a cell that stands for m fine cells keeps 1 / m of its resistance to bending
+  ASSERT_EQ(bending.size(), graded->vertex_count());
+  for (std::int32_t c = 0; c < graded->vertex_count(); ++c) {
+    stands_for += 1 / bending[c];
+    if (!(std::abs(graded->positions()(c, 2) - 72) < 6)) continue;
+    ++kept;
+    EXPECT_GE(bending[c], 0.5) << c;
+  }
+  EXPECT_GE(kept, 0.8 * distorted);
+  EXPECT_NEAR(stands_for, shape->vertex_count(), 1e-6 * stands_for);
+  EXPECT_EQ(level->moved(*shape, x, Workers(1)).rows(), x.rows());
+
+  EXPECT_EQ(GradedLevel::create(*coarse, inputs, x, std::vector<double>(squared.size(), 0.0), 2, make),
+            nullptr);
+  EXPECT_EQ(GradedLevel::create(*coarse, inputs, x, squared, 2, [](auto) { return nullptr; }), nullptr);
+}
+
+}  // namespace
+}  // namespace lpdeform
