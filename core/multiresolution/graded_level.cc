@@ -45,7 +45,8 @@ GradedLevel::GradedLevel(std::unique_ptr<CoarseLevel> level, const RestShape& fi
 
 std::unique_ptr<GradedLevel> GradedLevel::create(const CoarseLevel& coarse, const FineInputs& fine,
                                                  const Points& x, const std::vector<double>& squared_energies,
-                                                 double largest_p, const MakeLevelSolver& make_solver) {
+                                                 double largest_p, const MakeLevelSolver& make_solver,
+                                                 const std::stop_token& stop) {
   const double power = 0.5 * std::min(largest_p, kMostPower);
   const double typical = *std::max_element(squared_energies.begin(), squared_energies.end());
   if (!(typical > 0) || !std::isfinite(typical)) return nullptr;
@@ -60,8 +61,10 @@ std::unique_ptr<GradedLevel> GradedLevel::create(const CoarseLevel& coarse, cons
   const auto kept = static_cast<std::int32_t>(std::count(stays.begin(), stays.end(), 1));
   const std::int32_t wanted = kept + (all - kept) / CoarseLevel::kRatio;
   if (wanted > kLargest * all) return nullptr;
-  std::unique_ptr<CoarseLevel> level = CoarseLevel::create(
-      fine.shape, coarsen({fine.shape.positions(), fine.shape.faces()}, wanted, stays), make_solver);
+  CoarseMesh mesh = coarsen({fine.shape.positions(), fine.shape.faces()}, wanted, stays);
+  if (stop.stop_requested()) return nullptr;
+  std::unique_ptr<CoarseLevel> level = CoarseLevel::create(fine.shape, std::move(mesh), make_solver);
+  if (stop.stop_requested()) return nullptr;
   if (!level || !level->restrict_inputs(fine).ok()) return nullptr;
   Field bending(static_cast<Eigen::Index>(level->share_.size()));
   for (std::size_t c = 0; c < level->share_.size(); ++c)

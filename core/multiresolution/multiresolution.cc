@@ -142,7 +142,7 @@ bool Multiresolution::begin_graded() {
   objective_ = problem_.objective.evaluate(x_, problem_.norm);
   const FineInputs inputs{problem_.shape(), grading.handles, problem_.constraints, grading.material, 1};
   graded_ = GradedLevel::create(level_, inputs, x_, problem_.objective.cells().squared_energies(),
-                                problem_.norm.highest_p(), grading.make_solver);
+                                problem_.norm.highest_p(), grading.make_solver, problem_.stop);
   looked_at_ = 0;
   const double tolerance = problem_.norm.highest_p() > 2 ? kGradedToleranceAtLargeP : kGradedTolerance;
   if (graded_ && graded_->start(std::max(problem_.tolerance, tolerance), problem_.stop).ok()) return true;

@@ -196,7 +196,7 @@ TEST_F(GradedLevelTest, HasTheVerticesWhereTheDistortionIs) {
     if (std::abs(mesh.vertices(static_cast<Eigen::Index>(v), 2) - 72) < 6) squared[v] = 1, ++distorted;
   }
   const Points& x = shape->scaled_positions();
-  const auto level = GradedLevel::create(*coarse, inputs, x, squared, 2, make);
+  const auto level = GradedLevel::create(*coarse, inputs, x, squared, 2, make, {});
   ASSERT_NE(level, nullptr);
   EXPECT_GE(graded->vertex_count(), distorted);
   EXPECT_LT(graded->vertex_count(), shape->vertex_count() / 2);
@@ -213,9 +213,12 @@ TEST_F(GradedLevelTest, HasTheVerticesWhereTheDistortionIs) {
   EXPECT_NEAR(stands_for, shape->vertex_count(), 1e-6 * stands_for);
   EXPECT_EQ(level->moved(*shape, x, Workers(1)).rows(), x.rows());
 
-  EXPECT_EQ(GradedLevel::create(*coarse, inputs, x, std::vector<double>(squared.size(), 0.0), 2, make),
+  EXPECT_EQ(GradedLevel::create(*coarse, inputs, x, std::vector<double>(squared.size(), 0.0), 2, make, {}),
             nullptr);
-  EXPECT_EQ(GradedLevel::create(*coarse, inputs, x, squared, 2, [](auto) { return nullptr; }), nullptr);
+  EXPECT_EQ(GradedLevel::create(*coarse, inputs, x, squared, 2, [](auto) { return nullptr; }, {}), nullptr);
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_EQ(GradedLevel::create(*coarse, inputs, x, squared, 2, make, stop.get_token()), nullptr);
 }
 
 }  // namespace
