@@ -102,7 +102,7 @@ absl::Status CoarseLevel::restrict_inputs(const FineInputs& fine) {
     for (std::size_t c = 0; c < n; ++c) {
       const auto i = static_cast<Eigen::Index>(c);
       stiffness[i] =
-          std::clamp(at(coarse.stiffness, i) * std::pow(share_[c] / kRatio, 1 - at(coarse.p, i) / 2),
+          std::clamp(at(coarse.stiffness, i) * std::pow(share_[c] / ratio_, 1 - at(coarse.p, i) / 2),
                      Material::kLowestStiffness, Material::kHighestStiffness);
     }
     coarse.stiffness = std::move(stiffness);

@@ -124,7 +124,8 @@ class CoarseLevel {
   std::vector<double> share_;                              // the number of fine vertices of each coarse one
   std::vector<Guides> guides_;                             // of each fine vertex
   std::shared_ptr<const RestShape> shape_;
-  double bending_ = 1;  // of the fine level
+  double ratio_ = kRatio;  // fine vertices of a cell whose stiffness is that of a fine cell
+  double bending_ = 1;     // of the fine level
   std::unique_ptr<LevelSolver> solver_;
   /// The solver's state, where lead() has come to it. least_energy() may since have moved the solver of the lowest level on.
   std::optional<Pose> led_to_;

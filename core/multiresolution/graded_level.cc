@@ -10,8 +10,8 @@ namespace {
 
 constexpr double kShare = 0.8;    // of the sum of E_i^q that the cells have which stay; q is the largest p_i,
 constexpr double kMostPower = 3;  // but at most this: at a large p other cells come to be the worst ones
-constexpr double kMostChosen = 0.2;  // of the fine vertices, before the ring around them is added
-constexpr double kLargest = 0.45;    // this level's vertices, as a share of the fine ones
+constexpr double kMostChosen = 0.2;     // of the fine vertices, before the ring around them is added
+constexpr std::size_t kWorkspace = 12;  // of a running solver, in positions of all vertices
 
 /// The coarse vertices with the largest amounts for each fine vertex, until they have kShare of the sum, and the ring around them.
 /// `amount` and `share`, the number of fine vertices, are of each coarse vertex.
@@ -65,7 +65,9 @@ std::unique_ptr<GradedLevel> GradedLevel::create(const CoarseLevel& coarse, cons
   if (stop.stop_requested()) return nullptr;
   std::unique_ptr<CoarseLevel> level = CoarseLevel::create(fine.shape, std::move(mesh), make_solver);
   if (stop.stop_requested()) return nullptr;
-  if (!level || !level->restrict_inputs(fine).ok()) return nullptr;
+  if (!level) return nullptr;
+  level->ratio_ = 1;
+  if (!level->restrict_inputs(fine).ok()) return nullptr;
   Field bending(static_cast<Eigen::Index>(level->share_.size()));
   for (std::size_t c = 0; c < level->share_.size(); ++c)
     bending[static_cast<Eigen::Index>(c)] = fine.bending / level->share_[c];
@@ -81,6 +83,11 @@ absl::Status GradedLevel::start(double tolerance, std::stop_token stop) {
   settings.effort = 0;
   settings.keep_trace = false;
   return level_->solver().start_prepared(settings, std::move(stop));
+}
+
+std::size_t GradedLevel::memory_bytes() const {
+  return level_->memory_bytes() + before_.memory_bytes() +
+         kWorkspace * 3 * sizeof(double) * level_->share_.size();
 }
 
 Points GradedLevel::moved(const RestShape& fine, const Points& x, const Workers& workers) const {

@@ -14,6 +14,8 @@ namespace lpdeform {
 /// fine cells that it stands for (CellPass::set_bending). One caller at a time.
 class GradedLevel {
  public:
+  static constexpr double kLargest = 0.45;  // the level's vertices, as a share of the fine ones
+
   /// For the fine state x (scaled units), which has the E_i^2 `squared_energies` and which `coarse` has led to. `largest_p` is the
   /// largest p_i. Null if the distortion is spread so widely that the level would be too large, if no solver takes it, or once `stop`
   /// is requested: at a million vertices it takes two seconds.
@@ -26,11 +28,12 @@ class GradedLevel {
   absl::Status start(double tolerance, std::stop_token stop);
   LevelSolver& solver() { return level_->solver(); }
 
-  /// The fine state x, moved along with this level since start(). Fine vertices that this level has are where it has them.
+  /// The fine state x, moved along with this level since start(). Fine vertices that stand only for themselves on this level are where it has them.
   /// Held vertices are only about where they are held.
   Points moved(const RestShape& fine, const Points& x, const Workers& workers) const;
 
-  std::size_t memory_bytes() const { return level_->memory_bytes(); }
+  /// With what its solver takes while it runs.
+  std::size_t memory_bytes() const;
 
  private:
   GradedLevel(std::unique_ptr<CoarseLevel> level, const RestShape& fine);

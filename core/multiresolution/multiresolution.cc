@@ -50,8 +50,9 @@ Multiresolution::Multiresolution(Problem problem, Points x, CoarseLevel& level, 
   }
   settings.tolerance = std::max(problem_.tolerance, first_tolerance());
   settings.effort = effort;
-  if (!level_.solver().start(settings, problem_.stop).ok())
-    fine_ = std::make_unique<QuasiNewton>(problem_, x_, Warmth::kCold);
+  if (level_.solver().start(settings, problem_.stop).ok()) return;
+  grading_.reset();
+  fine_ = std::make_unique<QuasiNewton>(problem_, x_, Warmth::kCold);
 }
 
 /// Whether the handles have moved little: E_i^2 <= kGentleStrain^2 sum_j w_ij |p_i - p_j|^2 in every cell of the guess.
@@ -92,12 +93,13 @@ void Multiresolution::make_feasible(Points& found) const {
     problem_.constraints.linear.satisfy_within(problem_.metric, found, problem_.workers());
 }
 
-/// Blended rigid motions leave kinks. One local/global step at p = 2 smooths them, with the metric of equal weights
-/// that the guess was made with.
+/// Blended rigid motions leave kinks. One local/global step smooths them. Before the first fine iteration the metric is that of equal
+/// weights, with which the guess was made, and the step is one of p = 2. After that it is the one that QuasiNewton has left, and the
+/// step is one of the norm that it belongs to.
 void Multiresolution::even_out(Points& found) const {
   const LpNorm even(Material::uniform(2), problem_.shape().vertex_count(), 1, 1);
   Points step;
-  problem_.objective.evaluate(found, even);
+  problem_.objective.evaluate(found, fine_iterations_ > 0 ? problem_.norm : even);
   problem_.objective.gradient(step);
   restrict_to_free(problem_.constraints, step);
   problem_.precondition(step, step);
@@ -175,13 +177,14 @@ Points Multiresolution::moved_with_graded() const {
 void Multiresolution::end_graded() {
   Points found = moved_with_graded();
   graded_.reset();
-  const double most = std::pow(kMostAfterGraded, problem_.norm.highest_p()) * objective_;
+  const double most = std::pow(kMostAfterGraded, problem_.norm.lowest_p()) * objective_;
   const bool is_good = found.allFinite() && problem_.objective.evaluate(found, problem_.norm) < most;
   if (is_good)
     x_.swap(found);
   else
     problem_.objective.evaluate(x_, problem_.norm);
   found.resize(0, 3);
+  stage_ = stages_before_++;  // the objective may be higher than while the level ran
   fine_ = std::make_unique<QuasiNewton>(problem_, std::move(x_), is_good ? Warmth::kWarm : Warmth::kPrepared);
 }
 

@@ -33,6 +33,14 @@ std::size_t bytes_beside_metric(const RestShape& shape) {
          kEdgeBytes * shape.neighbours().size();
 }
 
+/// What a graded level takes at most, beyond the workspace that the solver of the fine level does not have while it runs.
+std::size_t bytes_of_graded_level(const RestShape& shape, std::size_t own) {
+  const auto level = static_cast<std::size_t>(GradedLevel::kLargest * static_cast<double>(own));
+  const std::size_t unused =
+      (kWorkspace - kWorkspaceOfLevel) * 3 * sizeof(double) * static_cast<std::size_t>(shape.vertex_count());
+  return std::max(level, unused) - unused;
+}
+
 absl::Status not_solved(const char* what) {
   return make_fault({Reason::kNotSolved, "", ""},
                     absl::StrCat("Solve for the current inputs before you ", what, "."));
@@ -54,7 +62,9 @@ absl::StatusOr<std::unique_ptr<Deformer>> Deformer::create(std::shared_ptr<const
     if (!options.admit) return absl::OkStatus();
     const std::size_t own = metric_bytes + bytes_beside_metric(*shape);
     const bool has_coarse = shape->vertex_count() >= kCoarsenBeforehand;
-    return options.admit(has_coarse ? own + own / kCoarseShare : own);
+    std::size_t with_levels = has_coarse ? own + own / kCoarseShare : own;
+    if (shape->vertex_count() >= options.graded_from) with_levels += bytes_of_graded_level(*shape, own);
+    return options.admit(with_levels);
   };
   std::optional<absl::StatusOr<Metric>> metric;
   std::optional<Objective> objective;
@@ -109,7 +119,7 @@ absl::Status Deformer::set_handles(const HandleSet& handles) {
 
 void Deformer::set_bending(const Field& shares) {
   impl_->change_inputs();
-  if (shares == impl_->bending) return;
+  if (shares.size() == impl_->bending.size() && shares == impl_->bending) return;
   impl_->bending = shares;
   impl_->lead = Impl::Lead::kNone;
   impl_->objective.set_bending(shares);

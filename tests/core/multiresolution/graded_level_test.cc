@@ -97,6 +97,57 @@ TEST_F(GradedLevelTest, RunsAfterTheFirstFineIterations) {
   }
 }
 
+TEST_F(GradedLevelTest, NoStageGoesBackOrUp) {
+  for (const double p : {1.0, 1.5, 2.0, 6.0}) {
+    const SolveSummary summary = solver(Material::uniform(p), true)->solve(settings()).value();
+    for (std::size_t k = 1; k < summary.trace.size(); ++k) {
+      const IterationRecord &before = summary.trace[k - 1], &now = summary.trace[k];
+      EXPECT_GE(now.stage, before.stage) << "p = " << p << ", record " << k;
+      if (now.stage == before.stage) {
+        EXPECT_LE(now.objective, before.objective * (1 + 1e-12)) << "p = " << p << ", record " << k;
+      }
+    }
+  }
+}
+
+/// Shares of one value and of one for each cell are told apart, even if the first is the same.
+TEST_F(GradedLevelTest, ASolverTakesTheBendingOfEachCell) {
+  Field shares = Field::Constant(shape->vertex_count(), 0.2);
+  shares[0] = 1;
+  const auto solver = deformer(shape, fold(), Material::uniform(2));
+  solver->set_bending(shares);
+  SolveSettings once = settings();
+  once.method = Method::kQuasiNewton;
+  once.max_iterations = 1;
+  (void)solver->solve(once);
+  CellPass cells(shape, Workers(1));
+  cells.set_bending(shares);
+  const double unit = shape->mean_edge_length();
+  const double sum = cells.evaluate((solver->positions().rowwise() - shape->centre()) / unit,
+                                    LpNorm(Material::uniform(2), shape->vertex_count(), 1, 1));
+  EXPECT_NEAR(solver->cell_energies().squaredNorm(), unit * unit * sum, 1e-6 * sum);
+  solver->set_bending(Field::Ones(1));
+  (void)solver->solve(once);
+  EXPECT_GT(solver->cell_energies().squaredNorm(), 1.01 * unit * unit * sum);
+}
+
+TEST_F(GradedLevelTest, AdmissionCountsWhatASolveTakes) {
+  for (const double p : {2.0, 6.0}) {
+    std::size_t admitted = 0;
+    const auto admit = [&](std::size_t bytes) {
+      admitted = bytes;
+      return absl::OkStatus();
+    };
+    const auto solver = Deformer::create(shape, {.graded_from = 1000, .admit = admit}).value();
+    ASSERT_TRUE(solver->set_handles(fold()).ok());
+    ASSERT_TRUE(solver->set_material(Material::uniform(p)).ok());
+    ASSERT_TRUE(solver->start(settings()).ok());
+    std::size_t most = 0;
+    while (solver->step()) most = std::max(most, solver->memory_bytes());
+    EXPECT_LE(most, admitted) << "p = " << p;
+  }
+}
+
 /// At a large p it runs before them. Its iterations count.
 TEST_F(GradedLevelTest, RunsBeforeTheFirstFineIterationsAtALargeP) {
   const auto waits_before = [](const SolveSummary& summary) {
