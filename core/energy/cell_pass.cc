@@ -109,10 +109,12 @@ double CellPass::sum(const LpNorm& norm) const {
 
 void CellPass::gradient(Points& result) const {
   result.resize(shape_->vertex_count(), 3);
-  for (std::size_t i = 0; i < bent_c_.size(); ++i) {
-    bent_c_[i] = bending(i) * c_[i];
-    stretched_c_[i] = (1 - bending(i)) * c_[i];
-  }
+  workers_.for_chunks(bent_c_.size(), kRowChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      bent_c_[i] = bending(i) * c_[i];
+      stretched_c_[i] = (1 - bending(i)) * c_[i];
+    }
+  });
   const std::vector<double>& c = membrane_ ? bent_c_ : c_;
   workers_.for_chunks(c_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     gradient_of_blocks(blocks_, begin / kLanes, (end + kLanes - 1) / kLanes, state_, c.data(), result.data());

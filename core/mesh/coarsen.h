@@ -20,7 +20,8 @@ struct CoarseMesh {
 /// Collapses short edges into one of their ends, in rounds of growing edge length, until about `vertices` vertices are
 /// left or no edge can be collapsed. The vertex spacing becomes even, boundaries stay boundaries, and no remaining face
 /// turns by more than 60 degrees in one collapse, which preserves creases. Faces with the half-edge of an
-/// earlier face are left out, and a vertex that joins several fans of faces stays. The result is for coarse levels, not for output. Vertices that are marked in `stays` stay; it has one mark for each vertex, or none. Deterministic. O(n) for each factor of two.
+/// earlier face are left out, and a vertex that joins several fans of faces stays. Vertices that are marked in `stays` stay, too; it has
+/// one mark for each vertex, or none. The result is for coarse levels, not for output. Deterministic. O(n) for each factor of two.
 CoarseMesh coarsen(const TriangleMesh& mesh, std::int32_t vertices, const std::vector<char>& stays = {});
 
 }  // namespace lpdeform

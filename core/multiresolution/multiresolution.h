@@ -25,11 +25,12 @@ struct Grading {
 /// the beginning; only the lowest is first solved with the bending of the level above it. The long way along a curved valley
 /// is travelled where an iteration costs least.
 ///
-/// On very large meshes a graded level goes on after some fine iterations, unless the handles have moved little, and the fine level
-/// after that.
+/// On very large meshes a graded level (graded_level.h) follows after some fine iterations, or before them if some p_i > 2, unless the
+/// handles have moved little. The fine level goes on from its result.
 ///
 /// One iteration of the coarse or the graded level counts as one iteration here. Until the coarse level has ended, the state is the
-/// initial guess; while the graded level runs, the fine state before. If the prolonged result is not better than the initial guess, QuasiNewton starts from the guess.
+/// initial guess. While the graded level runs, it is the fine state before. If the prolonged result is not better than the initial
+/// guess, QuasiNewton starts from the guess, and there is no graded level.
 /// The convergence criterion is that of QuasiNewton.
 class Multiresolution : public Minimiser {
  public:
@@ -42,7 +43,7 @@ class Multiresolution : public Minimiser {
   StepResult step() override;
   const Points& x() const override { return fine_ ? fine_->x() : x_; }
   std::size_t level_bytes() const override { return graded_ ? graded_->memory_bytes() : 0; }
-  /// The prolonged state of the coarse or the graded level. This costs about as much as two iterations, so there is a new one only
+  /// The prolonged state of the coarse or the graded level. This costs about as much as three iterations, so there is a new one only
   /// when four times that time has passed since the previous one, or if it is the last.
   std::optional<Points> intermediate_state(bool is_last) override;
 

@@ -120,33 +120,31 @@ Problem Deformer::Impl::make_problem() {
           stop};
 }
 
-/// Null if the level takes no solver.
-std::unique_ptr<LevelSolver> Deformer::Impl::make_level_solver(std::shared_ptr<const RestShape> level) const {
-  const DeformerOptions of_level{.free_components = FreeComponents::kStay,
-                                 .threads = workers().threads(),
-                                 .search_up_to = kLargestSearchedLevel,
-                                 .least_saving = is_large() ? kLeastSavingOfLevel : 0,
-                                 .graded_from = std::numeric_limits<std::int32_t>::max()};
-  auto deformer = Deformer::create(std::move(level), of_level);
-  return deformer.ok() ? std::make_unique<DeformerOfLevel>(*std::move(deformer)) : nullptr;
+/// Makes the solvers of levels. They have no graded levels themselves.
+MakeLevelSolver Deformer::Impl::level_maker() const {
+  return [this](std::shared_ptr<const RestShape> level) -> std::unique_ptr<LevelSolver> {
+    const DeformerOptions of_level{.free_components = FreeComponents::kStay,
+                                   .threads = workers().threads(),
+                                   .search_up_to = kLargestSearchedLevel,
+                                   .least_saving = is_large() ? kLeastSavingOfLevel : 0,
+                                   .graded_from = std::numeric_limits<std::int32_t>::max()};
+    auto deformer = Deformer::create(std::move(level), of_level);
+    return deformer.ok() ? std::make_unique<DeformerOfLevel>(*std::move(deformer)) : nullptr;
+  };
 }
 
 /// What a graded level takes, where a solve is to have one.
 std::optional<Grading> Deformer::Impl::grading() const {
   if (shape->vertex_count() < options.graded_from || shape->weight_kind() == WeightKind::kUniform)
     return std::nullopt;
-  return Grading{handles, effective_material(), [this](std::shared_ptr<const RestShape> level) {
-                   return make_level_solver(std::move(level));
-                 }};
+  return Grading{handles, effective_material(), level_maker()};
 }
 
 /// Makes the coarse level if there is none. False if the mesh cannot be coarsened, which is tried once.
 bool Deformer::Impl::make_coarse() {
   if (!coarse && !is_coarsest) {
     CoarseMesh mesh = coarse_mesh ? *std::exchange(coarse_mesh, {}) : CoarseLevel::coarsened(*shape);
-    coarse = CoarseLevel::create(*shape, std::move(mesh), [this](std::shared_ptr<const RestShape> level) {
-      return make_level_solver(std::move(level));
-    });
+    coarse = CoarseLevel::create(*shape, std::move(mesh), level_maker());
     is_coarsest = coarse == nullptr;
   }
   return coarse != nullptr;

@@ -58,7 +58,7 @@ struct Deformer::Impl {
   bool is_best_zero() const;
   Problem make_problem();
   Method chosen_method(Method asked, bool is_warm);
-  std::unique_ptr<LevelSolver> make_level_solver(std::shared_ptr<const RestShape> level) const;
+  MakeLevelSolver level_maker() const;
   std::optional<Grading> grading() const;
   bool make_coarse();
   bool prepare_coarse();
