@@ -8,6 +8,9 @@ namespace lpdeform {
 /// n points, one per row, in the caller's unit of length.
 using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
+/// n points in single precision.
+using SinglePoints = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
 /// m triangles, one per row, as 0-based vertex indices in counter-clockwise order seen from outside.
 using Faces = Eigen::Matrix<std::int32_t, Eigen::Dynamic, 3, Eigen::RowMajor>;
 

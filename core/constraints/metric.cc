@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kPasses = 12;
 constexpr double kRefined = 1e-12;  // refinement ends when the correction's share of the result is <= this
-constexpr std::size_t kBytesPerEntry = 32;  // per matrix entry: its row and its places in the factor
+constexpr std::size_t kBytesPerEntry = 20;  // per matrix entry: what the factor has besides its values
 constexpr double kSlowest = 0.3;            // the largest ratio of a correction to the previous one
 
 LowerMatrix lower_pattern(const RestShape& shape) {
@@ -40,11 +40,12 @@ absl::StatusOr<Metric> Metric::create(std::shared_ptr<const RestShape> shape, co
         admit(entry_count(*supernodes) * sizeof(float) + kBytesPerEntry * matrix.rows.size());
     if (!status.ok()) return status;
   }
-  return Metric(std::move(shape), std::move(matrix), *supernodes);
+  matrix = {};
+  return Metric(std::move(shape), *supernodes);
 }
 
-Metric::Metric(std::shared_ptr<const RestShape> shape, LowerMatrix matrix, const SupernodePattern& supernodes)
-    : shape_(std::move(shape)), matrix_(std::move(matrix)), single_(matrix_, supernodes) {}
+Metric::Metric(std::shared_ptr<const RestShape> shape, const SupernodePattern& supernodes)
+    : shape_(std::move(shape)), single_(supernodes) {}
 
 bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held,
                     const std::vector<MatrixEntry>& entries, const Workers& workers, Precision precision) {
@@ -62,61 +63,86 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
     cell_weights_ = std::move(clipped);
     is_held_ = is_held;
     entries_ = std::move(scaled);
+    index_entries();
     matrix_.values.clear();
   }
   precision_ = precision;
   is_single_current_ = is_double_current_ = false;
   ++version_;
-  need_values(workers);
-  if (precision == Precision::kSingle && single_.factor(matrix_, workers)) {
+  if (precision == Precision::kSingle && single_.factor(Rows(*this), workers)) {
     double_.reset();  // takes several times the memory
     copy_ = {};
-    matrix_.values = std::vector<double>();
+    matrix_ = {};
     return is_good_ = is_single_current_ = true;
   }
-  return is_good_ = factor_double(workers);
+  return is_good_ = factor_double();
 }
 
-bool Metric::factor_double(const Workers& workers) const {
-  need_values(workers);
+bool Metric::factor_double() const {
+  need_matrix();
   if (!double_) double_.emplace(matrix_, single_.result().new_to_old());
   copy_.clear();
   return is_double_current_ = double_->factor(matrix_);
 }
 
-/// Makes the matrix's values if there are none. They are freed after a factorisation in single precision. Refinement and a factor in
-/// double precision need them again.
-void Metric::need_values(const Workers& workers) const {
-  if (!matrix_.values.empty()) return;
-  matrix_.values.resize(matrix_.rows.size());
-  const auto n = static_cast<std::size_t>(shape_->vertex_count());
-  workers.for_chunks(n, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (auto i = static_cast<std::int32_t>(begin); i < static_cast<std::int32_t>(end); ++i) {
-      double diagonal = 0;
-      std::int32_t entry = matrix_.columns[i];
-      for (std::int32_t k = shape_->offsets()[i]; k < shape_->offsets()[i + 1]; ++k) {
-        const std::int32_t j = shape_->neighbours()[k];
-        const double weight = edge_weight(i, k);
-        diagonal += weight;
-        if (j > i) matrix_.values[++entry] = is_held_[i] || is_held_[j] ? 0.0 : -weight;
-      }
-      matrix_.values[matrix_.columns[i]] = is_held_[i] ? 1.0 : diagonal;
-    }
-  });
-  for (const MatrixEntry& entry : entries_) add_entry(entry);
+/// Sorts entries_ by row, for Rows.
+void Metric::index_entries() {
+  by_row_ = entries_;
+  for (const MatrixEntry& entry : entries_) {
+    if (entry.row != entry.column) by_row_.push_back({entry.column, entry.row, entry.value});
+  }
+  std::stable_sort(by_row_.begin(), by_row_.end(),
+                   [](const MatrixEntry& a, const MatrixEntry& b) { return a.row < b.row; });
 }
 
-void Metric::add_entry(const MatrixEntry& entry) const {
-  if (is_held_[entry.row] || is_held_[entry.column]) return;
-  const auto begin = matrix_.rows.begin() + matrix_.columns[entry.column];
-  const auto end = matrix_.rows.begin() + matrix_.columns[entry.column + 1];
-  const auto found = std::lower_bound(begin, end, entry.row);
-  if (found != end && *found == entry.row) {
-    matrix_.values[found - matrix_.rows.begin()] += entry.value;
-    return;
+void Metric::Rows::append_row(std::int32_t i, std::vector<Entry>& to) const {
+  const Metric& metric = metric_;
+  const RestShape& shape = *metric.shape_;
+  if (metric.is_held_[i]) return void(to.push_back({i, 1}));
+  const std::size_t own = to.size();
+  const std::int32_t begin = shape.offsets()[i], end = shape.offsets()[i + 1];
+  to.resize(own + 1 + static_cast<std::size_t>(end - begin));
+  Entry* entry = to.data() + own;
+  double diagonal = 0;
+  for (std::int32_t k = begin; k < end; ++k) {
+    const std::int32_t j = shape.neighbours()[k];
+    const double weight = metric.edge_weight(i, k);
+    diagonal += weight;
+    *++entry = {j, metric.is_held_[j] ? 0.0 : -weight};
   }
-  for (const std::int32_t i : {entry.row, entry.column})
-    matrix_.values[matrix_.columns[i]] += std::abs(entry.value);
+  to[own] = {i, diagonal};
+  if (metric.by_row_.empty()) return;
+  auto added = std::lower_bound(metric.by_row_.begin(), metric.by_row_.end(), i,
+                                [](const MatrixEntry& entry, std::int32_t row) { return entry.row < row; });
+  for (; added != metric.by_row_.end() && added->row == i; ++added) {
+    if (metric.is_held_[added->column]) continue;
+    const auto is_there = [&](const Entry& entry) { return entry.column == added->column; };
+    const auto found = std::find_if(to.begin() + static_cast<std::ptrdiff_t>(own), to.end(), is_there);
+    if (found != to.end())
+      found->value += added->value;
+    else
+      to[own].value += std::abs(added->value);
+  }
+}
+
+/// Makes the matrix if there is none. It is freed after a factorisation in single precision. Refinement and a factor in double
+/// precision need it.
+void Metric::need_matrix() const {
+  if (!matrix_.values.empty()) return;
+  if (matrix_.columns.empty()) matrix_ = lower_pattern(*shape_);
+  matrix_.values.reserve(matrix_.rows.size());
+  const Rows rows(*this);
+  std::vector<SymmetricRows::Entry> row;
+  for (std::int32_t i = 0; i < matrix_.size(); ++i) {
+    row.clear();
+    rows.append_row(i, row);
+    std::int32_t entry = matrix_.columns[i];
+    matrix_.values.resize(static_cast<std::size_t>(matrix_.columns[i + 1]), 0.0);
+    matrix_.values[entry] = row.front().value;
+    for (const SymmetricRows::Entry& one : row) {
+      if (one.column > i) matrix_.values[++entry] = one.value;
+    }
+  }
 }
 
 void Metric::adopt(const std::vector<double>& cell_weights) {
@@ -175,7 +201,7 @@ Points Metric::turning_forces(const Points& from, const Points& to, const std::v
 
 /// x = matrix_^-1 b, x not b, by refinement from single precision. False if that does not converge.
 bool Metric::refine(const Points& b, Points& x, const Workers& workers) const {
-  need_values(workers);
+  need_matrix();
   solve_single(b, x, workers);
   Points rest, correction;
   double before = x.norm();
@@ -195,7 +221,7 @@ bool Metric::refine(const Points& b, Points& x, const Workers& workers) const {
 
 void Metric::solve_scaled(const Points& b, Points& x, const Workers& workers) const {
   if (!is_double_current_ && refine(b, x, workers)) return;
-  if (!is_double_current_ && !factor_double(workers)) {
+  if (!is_double_current_ && !factor_double()) {
     x.setConstant(b.rows(), 3, std::numeric_limits<double>::quiet_NaN());
     return;
   }
@@ -214,11 +240,6 @@ void Metric::subtract_product(const Points& x, Points& b) const {
   }
 }
 
-void Metric::solve_single(const Points& b, Points& x, const Workers& workers, double factor) const {
-  ++back_substitutions_;
-  single().solve(b, x, workers, factor);
-}
-
 const SingleFactor& Metric::single() const {
   if (is_single_current_) return single_.result();
   if (copy_.empty()) double_->copy_to(copy_);
@@ -235,11 +256,16 @@ void Metric::precondition(const Points& b, Points& x, const Workers& workers) co
   solve_single(b, x, workers, 1 / scale_);
 }
 
+void Metric::precondition(const Points& b, SinglePoints& x, const Workers& workers) const {
+  solve_single(b, x, workers, 1 / scale_);
+}
+
 std::size_t Metric::memory_bytes() const {
   return single_.memory_bytes() + (double_ ? double_->memory_bytes() : 0) + copy_.memory_bytes() +
          cell_weights_.capacity() * sizeof(double) + is_held_.capacity() +
-         entries_.capacity() * sizeof(MatrixEntry) + matrix_.columns.capacity() * sizeof(std::int32_t) +
-         matrix_.rows.capacity() * sizeof(std::int32_t) + matrix_.values.capacity() * sizeof(double);
+         (entries_.capacity() + by_row_.capacity()) * sizeof(MatrixEntry) +
+         matrix_.columns.capacity() * sizeof(std::int32_t) + matrix_.rows.capacity() * sizeof(std::int32_t) +
+         matrix_.values.capacity() * sizeof(double);
 }
 
 }  // namespace lpdeform

@@ -72,6 +72,7 @@ class Metric {
 
   /// x = M^-1 b to single precision. The matrix is always the same for the same version() and scale().
   void precondition(const Points& b, Points& x, const Workers& workers) const;
+  void precondition(const Points& b, SinglePoints& x, const Workers& workers) const;
 
   /// Extends the displacements of held vertices (their rows of u) to the free ones: the minimiser of the sum over edges
   /// of (c_i + c_j) w_ij |u_i - u_j|^2, to single precision. Rows of free vertices are overwritten. If `forces` is not
@@ -103,15 +104,29 @@ class Metric {
  private:
   static constexpr std::size_t kChunk = 4096;  // vertices
 
-  Metric(std::shared_ptr<const RestShape> shape, LowerMatrix matrix, const SupernodePattern& supernodes);
+  /// A row of M / scale_.
+  class Rows : public SymmetricRows {
+   public:
+    explicit Rows(const Metric& metric) : metric_(metric) {}
+    void append_row(std::int32_t i, std::vector<Entry>& to) const override;
+
+   private:
+    const Metric& metric_;
+  };
+
+  Metric(std::shared_ptr<const RestShape> shape, const SupernodePattern& supernodes);
+  void index_entries();
   double edge_weight(std::int32_t i, std::int32_t k) const {
     return 2 * (cell_weights_[i] + cell_weights_[shape_->neighbours()[k]]) * shape_->weights()[k];
   }
-  void need_values(const Workers& workers) const;
-  void add_entry(const MatrixEntry& entry) const;
-  bool factor_double(const Workers& workers) const;
+  void need_matrix() const;
+  bool factor_double() const;
   bool refine(const Points& b, Points& x, const Workers& workers) const;
-  void solve_single(const Points& b, Points& x, const Workers& workers, double factor = 1) const;
+  template <typename Result>
+  void solve_single(const Points& b, Result& x, const Workers& workers, double factor = 1) const {
+    ++back_substitutions_;
+    single().solve(b, x, workers, factor);
+  }
   void solve_scaled(const Points& b, Points& x, const Workers& workers) const;
   const SingleFactor& single() const;
   void subtract_product(const Points& x, Points& b) const;
@@ -120,10 +135,11 @@ class Metric {
   std::vector<double> cell_weights_;  // clipped, over scale_
   std::vector<char> is_held_;
   std::vector<MatrixEntry> entries_;  // over scale_
+  std::vector<MatrixEntry> by_row_;   // the same, those off the diagonal both ways round, sorted by row
   double scale_ = 1;                  // the largest cell weight: M = scale_ * matrix_ on the free vertices
   bool is_good_ = false;
   std::uint64_t version_ = 0;
-  mutable LowerMatrix matrix_;  // see need_values()
+  mutable LowerMatrix matrix_;  // see need_matrix()
   SingleCholesky single_;
   Precision precision_ = Precision::kSingle;  // the requested one
   bool is_single_current_ = false;

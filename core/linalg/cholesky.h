@@ -22,6 +22,19 @@ struct LowerMatrix {
   std::int32_t size() const { return static_cast<std::int32_t>(columns.size()) - 1; }
 };
 
+/// A symmetric matrix that is read one row at a time. Several threads may read at once.
+class SymmetricRows {
+ public:
+  struct Entry {
+    std::int32_t column;
+    double value;
+  };
+  virtual ~SymmetricRows() = default;
+
+  /// Appends the entries of row i, on both sides of the diagonal and each column once, in any order.
+  virtual void append_row(std::int32_t i, std::vector<Entry>& to) const = 0;
+};
+
 /// The pattern of a factor's entries. Supernode k is columns first_columns[k] to first_columns[k + 1] - 1: a full
 /// triangle and, below it, the rows rows[first_rows[k]] to rows[first_rows[k + 1] - 1], ascending. All indices are in
 /// the new order.

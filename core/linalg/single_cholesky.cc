@@ -25,9 +25,8 @@ std::size_t entry_count(const SupernodePattern& supernodes) {
   return result;
 }
 
-SingleCholesky::SingleCholesky(const LowerMatrix& pattern, const SupernodePattern& supernodes) {
+SingleCholesky::SingleCholesky(const SupernodePattern& supernodes) {
   const std::size_t n = supernodes.new_to_old.size();
-  LPDEFORM_CHECK(n == static_cast<std::size_t>(pattern.size()));
   old_to_new_.resize(n);
   for (std::size_t i = 0; i < n; ++i) old_to_new_[supernodes.new_to_old[i]] = static_cast<std::int32_t>(i);
   factor_.begin(supernodes.new_to_old.data(), n, entry_count(supernodes));
@@ -46,7 +45,6 @@ SingleCholesky::SingleCholesky(const LowerMatrix& pattern, const SupernodePatter
   }
   factor_.finish();
   find_updates();
-  find_entries(pattern);
 }
 
 /// Finds which supernodes update which; ascending for each.
@@ -81,56 +79,36 @@ void SingleCholesky::find_updates() {
   });
 }
 
-/// Finds the place of each matrix entry in the factor.
-void SingleCholesky::find_entries(const LowerMatrix& pattern) {
-  const std::vector<std::int32_t> node_of = factor_.node_of_columns();
-  const auto for_entries = [&](const auto& body) {
-    for (std::int32_t j = 0; j < pattern.size(); ++j) {
-      for (std::int32_t e = pattern.columns[j]; e < pattern.columns[j + 1]; ++e) {
-        const std::int32_t a = old_to_new_[j], b = old_to_new_[pattern.rows[e]];
-        body(e, std::max(a, b), std::min(a, b));
-      }
-    }
-  };
-  first_entry_.assign(factor_.supernodes_.size() + 1, 0);
-  for_entries([&](std::int32_t, std::int32_t, std::int32_t column) { ++first_entry_[node_of[column] + 1]; });
-  for (std::size_t k = 0; k + 1 < first_entry_.size(); ++k) first_entry_[k + 1] += first_entry_[k];
-  entries_.resize(first_entry_.back());
-  std::vector<std::size_t> next(first_entry_.begin(), first_entry_.end() - 1);
-  for_entries([&](std::int32_t e, std::int32_t row, std::int32_t column) {
-    const SingleFactor::Supernode& node = factor_.supernodes_[node_of[column]];
-    std::size_t r = static_cast<std::size_t>(row - node.first_column);
-    if (row >= node.first_column + node.columns) {
-      const auto begin = factor_.rows_.begin() + static_cast<std::ptrdiff_t>(node.first_row);
-      const auto found = std::lower_bound(begin, begin + static_cast<std::ptrdiff_t>(node.row_count), row);
-      LPDEFORM_CHECK(found - begin < static_cast<std::ptrdiff_t>(node.row_count) && *found == row);
-      r = static_cast<std::size_t>(node.columns) + static_cast<std::size_t>(found - begin);
-    }
-    const std::size_t c = static_cast<std::size_t>(column - node.first_column);
-    entries_[next[node_of[column]]++] = {
-        e, static_cast<std::uint32_t>(r * static_cast<std::size_t>(node.columns) + c)};
-  });
-}
-
 SingleCholesky::Scratch& SingleCholesky::scratch_of_thread() {
   static thread_local Scratch result;
   return result;
 }
 
 /// Loads the matrix's entries into the block, and fills the table of places in the block.
-void SingleCholesky::load(std::size_t node, const LowerMatrix& matrix, Scratch& own) {
+void SingleCholesky::load(std::size_t node, const SymmetricRows& matrix, Scratch& own) {
   const SingleFactor::Supernode& at = factor_.supernodes_[node];
   const auto columns = static_cast<std::size_t>(at.columns);
   float* const block = factor_.values_.data() + at.first_value;
   std::fill_n(block, columns * (columns + at.row_count), 0.0f);
-  for (std::size_t e = first_entry_[node]; e < first_entry_[node + 1]; ++e)
-    block[entries_[e].target] = static_cast<float>(matrix.values[entries_[e].source]);
-  if (own.lowest.size() < columns) own.lowest.resize(columns);
-  for (std::size_t c = 0; c < columns; ++c) own.lowest[c] = kLowestPivot * block[c * columns + c];
   if (own.place.size() < old_to_new_.size()) own.place.resize(old_to_new_.size());
   for (std::size_t c = 0; c < columns; ++c) own.place[at.first_column + c] = static_cast<std::int32_t>(c);
   const std::int32_t* const rows = factor_.rows_.data() + at.first_row;
   for (std::size_t r = 0; r < at.row_count; ++r) own.place[rows[r]] = static_cast<std::int32_t>(columns + r);
+
+  for (std::size_t c = 0; c < columns; ++c) {
+    const std::int32_t column = at.first_column + static_cast<std::int32_t>(c);
+    own.row.clear();
+    matrix.append_row(factor_.new_to_old()[column], own.row);
+    for (const SymmetricRows::Entry& entry : own.row) {
+      const std::int32_t row = old_to_new_[entry.column];
+      if (row < column) continue;
+      const auto r = static_cast<std::size_t>(own.place[row]);
+      LPDEFORM_CHECK(r < columns + at.row_count);
+      block[r * columns + c] = static_cast<float>(entry.value);
+    }
+  }
+  if (own.lowest.size() < columns) own.lowest.resize(columns);
+  for (std::size_t c = 0; c < columns; ++c) own.lowest[c] = kLowestPivot * block[c * columns + c];
 }
 
 /// Subtracts the updates by previously eliminated supernodes from rows begin to end - 1 of a supernode.
@@ -162,7 +140,7 @@ void SingleCholesky::update_rows(std::size_t node, std::size_t begin, std::size_
   }
 }
 
-bool SingleCholesky::eliminate(std::size_t node, const LowerMatrix& matrix, const Workers& workers,
+bool SingleCholesky::eliminate(std::size_t node, const SymmetricRows& matrix, const Workers& workers,
                                Scratch& own) {
   const SingleFactor::Supernode& at = factor_.supernodes_[node];
   const auto columns = static_cast<std::size_t>(at.columns);
@@ -187,7 +165,7 @@ bool SingleCholesky::eliminate(std::size_t node, const LowerMatrix& matrix, cons
   return true;
 }
 
-bool SingleCholesky::factor(const LowerMatrix& matrix, const Workers& workers) {
+bool SingleCholesky::factor(const SymmetricRows& matrix, const Workers& workers) {
   std::atomic<bool> is_good = true;
   const Workers alone(1);
   workers.for_chunks(factor_.branches_.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
@@ -206,9 +184,8 @@ bool SingleCholesky::factor(const LowerMatrix& matrix, const Workers& workers) {
 
 std::size_t SingleCholesky::memory_bytes() const {
   return factor_.memory_bytes() + old_to_new_.capacity() * sizeof(std::int32_t) +
-         updates_.capacity() * sizeof(Update) + entries_.capacity() * sizeof(Entry) +
-         update_work_.capacity() * sizeof(double) +
-         (first_update_.capacity() + first_entry_.capacity()) * sizeof(std::size_t);
+         updates_.capacity() * sizeof(Update) + update_work_.capacity() * sizeof(double) +
+         first_update_.capacity() * sizeof(std::size_t);
 }
 
 }  // namespace lpdeform

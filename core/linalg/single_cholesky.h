@@ -16,12 +16,12 @@ namespace lpdeform {
 /// of the elimination tree and, above these, on different rows of a supernode. The same bits on any number of threads.
 class SingleCholesky {
  public:
-  /// `supernodes` is the result of analyse_supernodes() for `pattern`.
-  SingleCholesky(const LowerMatrix& pattern, const SupernodePattern& supernodes);
+  /// `supernodes` is the result of analyse_supernodes() for the matrices' pattern.
+  explicit SingleCholesky(const SupernodePattern& supernodes);
 
   /// False if a pivot is not above 1e-6 of its diagonal entry, because no correct digit of the pivot would be left.
   /// Then result() must not be used.
-  [[nodiscard]] bool factor(const LowerMatrix& matrix, const Workers& workers);
+  [[nodiscard]] bool factor(const SymmetricRows& matrix, const Workers& workers);
 
   const SingleFactor& result() const { return factor_; }
 
@@ -33,32 +33,25 @@ class SingleCholesky {
   struct Update {
     std::int32_t from, begin, count;
   };
-  /// An entry of the matrix and its place in the factor.
-  struct Entry {
-    std::int32_t source;
-    std::uint32_t target;  // counted from the supernode's first value
-  };
   /// The workspace of one thread, kept between calls.
   struct Scratch {
     std::vector<std::int32_t> place;  // position of each row of the matrix in the current block
+    std::vector<SymmetricRows::Entry> row;
     std::vector<float> packed, lowest;
     SolvingTriangle triangle;
   };
   static Scratch& scratch_of_thread();
   void find_updates();
-  void find_entries(const LowerMatrix& pattern);
-  void load(std::size_t node, const LowerMatrix& matrix, Scratch& own);
+  void load(std::size_t node, const SymmetricRows& matrix, Scratch& own);
   void update_rows(std::size_t node, std::size_t begin, std::size_t end,
                    const std::vector<std::int32_t>& place);
-  bool eliminate(std::size_t node, const LowerMatrix& matrix, const Workers& workers, Scratch& own);
+  bool eliminate(std::size_t node, const SymmetricRows& matrix, const Workers& workers, Scratch& own);
 
   SingleFactor factor_;
   std::vector<std::int32_t> old_to_new_;
   std::vector<Update> updates_;
   std::vector<std::size_t> first_update_;  // of each supernode; the last entry is the end
   std::vector<double> update_work_;        // of each supernode: multiplications
-  std::vector<Entry> entries_;
-  std::vector<std::size_t> first_entry_;
   Scratch trunk_;  // not shared with scratch_of_thread(): a waiting thread may start on another factorisation
 };
 

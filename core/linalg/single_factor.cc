@@ -208,11 +208,13 @@ double SingleFactor::largest_entry(const Points& b, const Workers& workers) cons
   return largest;
 }
 
-void SingleFactor::solve(const Points& b, Points& x, const Workers& workers, double factor) const {
+template <typename Result>
+void SingleFactor::solve_to(const Points& b, Result& x, const Workers& workers, double factor) const {
+  using Number = typename Result::Scalar;
   // b is divided by its largest entry, so that no magnitude of b leaves the range of single precision.
   const double largest = largest_entry(b, workers), scale = 1 / largest;
   x.resize(b.rows(), 3);
-  if (!std::isfinite(largest)) return void(x.setConstant(std::numeric_limits<double>::quiet_NaN()));
+  if (!std::isfinite(largest)) return void(x.setConstant(std::numeric_limits<Number>::quiet_NaN()));
   if (!std::isfinite(scale)) return void(x.setZero());
   const std::size_t n = new_to_old_.size();
   workers.for_chunks(n, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
@@ -240,10 +242,18 @@ void SingleFactor::solve(const Points& b, Points& x, const Workers& workers, dou
   const double back = factor * largest;
   workers.for_chunks(n, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      double* const row = x.data() + 3 * static_cast<std::size_t>(new_to_old_[i]);
-      for (int c = 0; c < 3; ++c) row[c] = back * static_cast<double>(work_[i][c]);
+      Number* const row = x.data() + 3 * static_cast<std::size_t>(new_to_old_[i]);
+      for (int c = 0; c < 3; ++c) row[c] = static_cast<Number>(back * static_cast<double>(work_[i][c]));
     }
   });
+}
+
+void SingleFactor::solve(const Points& b, Points& x, const Workers& workers, double factor) const {
+  solve_to(b, x, workers, factor);
+}
+
+void SingleFactor::solve(const Points& b, SinglePoints& x, const Workers& workers, double factor) const {
+  solve_to(b, x, workers, factor);
 }
 
 std::size_t SingleFactor::memory_bytes() const {

@@ -45,6 +45,7 @@ class SingleFactor {
 
   /// x = factor * A^-1 b. x may be b. One caller at a time.
   void solve(const Points& b, Points& x, const Workers& workers, double factor = 1) const;
+  void solve(const Points& b, SinglePoints& x, const Workers& workers, double factor = 1) const;
 
   const std::vector<std::int32_t>& new_to_old() const { return new_to_old_; }
 
@@ -66,6 +67,8 @@ class SingleFactor {
     std::vector<std::int32_t> owed;                               // rows of ancestors that the branch adds to
   };
   double largest_entry(const Points& b, const Workers& workers) const;
+  template <typename Result>
+  void solve_to(const Points& b, Result& x, const Workers& workers, double factor) const;
   std::vector<std::int32_t> node_of_columns() const;
   std::vector<std::int32_t> parents() const;
   void cut_branches();

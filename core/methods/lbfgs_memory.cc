@@ -21,12 +21,10 @@ std::vector<KeptPair> LbfgsMemory::kept() const {
 
 /// The sums of sweep_products over all chunks, added in chunk order.
 std::vector<double> LbfgsMemory::products(const Points& gradient, const Points& gradient_before,
-                                          const SinglePoints& h, const SinglePoints& h_before, double length,
-                                          const Points& d) {
+                                          const SinglePoints& h, double length, const Points& d) {
   const auto count = static_cast<std::size_t>(gradient.size());
-  candidate_.s.resize(count);
-  candidate_.z.resize(count);
-  const NewPair pair{gradient.data(), gradient_before.data(), h.data(),           h_before.data(), d.data(),
+  candidate_.s.resize(gradient.rows(), 3);
+  const NewPair pair{gradient.data(), gradient_before.data(), h.data(),           d.data(),
                      length,          candidate_.s.data(),    candidate_.z.data()};
   const std::vector<KeptPair> old = kept();
   const std::size_t width = kSumsBefore + kSumsOfPair * (old.size() + 1);
@@ -39,8 +37,8 @@ std::vector<double> LbfgsMemory::products(const Points& gradient, const Points& 
   return sums;
 }
 
-/// Drops the oldest pair if there is no room for another one.
-void LbfgsMemory::make_room() {
+/// Drops the oldest pair if there is no room for another one. The next pair takes its memory.
+void LbfgsMemory::drop_oldest() {
   if (pairs_.size() < most_pairs_) return;
   candidate_ = std::move(pairs_.front());
   pairs_.erase(pairs_.begin());
@@ -62,14 +60,14 @@ void LbfgsMemory::take_in(const std::vector<double>& sums) {
   pairs_.push_back(std::move(pair));
 }
 
-double LbfgsMemory::direction(const Points& gradient, const Points& gradient_before, const SinglePoints& h,
-                              const SinglePoints& h_before, double length, Points& d) {
+double LbfgsMemory::direction(const Points& gradient, const Points& gradient_before, SinglePoints& h,
+                              double length, Points& d) {
   if (length == 0) {
     d = -gamma_ * h.cast<double>();
+    candidate_.z.swap(h);
     return gradient.cwiseProduct(d).sum();
   }
-  make_room();
-  const std::vector<double> sums = products(gradient, gradient_before, h, h_before, length, d);
+  const std::vector<double> sums = products(gradient, gradient_before, h, length, d);
   const double curvature = sums[sums.size() - 2];
   const double size = length * std::sqrt(sums[0]) * std::sqrt(sums[1]);
   if (curvature > kLeastCurvature * size) take_in(sums);
@@ -102,6 +100,8 @@ double LbfgsMemory::direction(const Points& gradient, const Points& gradient_bef
                       [&](std::size_t, std::size_t begin, std::size_t end) {
                         sweep_direction(gamma_, h.data(), all, b.data(), a.data(), begin, end, d.data());
                       });
+  drop_oldest();
+  candidate_.z.swap(h);
   return slope;
 }
 

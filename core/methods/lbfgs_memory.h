@@ -9,8 +9,6 @@
 
 namespace lpdeform {
 
-using SinglePoints = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
-
 /// The memory of L-BFGS and its inverse Hessian H in compact form (Byrd, Nocedal & Schnabel 1994, theorem 2.2):
 ///
 ///   H g = gamma h + S R^-T ((D + gamma W) a - gamma Z^T g) - gamma Z a,   a = R^-1 S^T g,   h = M^-1 g
@@ -32,30 +30,32 @@ class LbfgsMemory {
 
   /// Forgets all pairs: M has changed.
   void clear() { pairs_.clear(); }
+  /// After clear(), if a step was made since the last direction(): `h` at which it began, with the new M. Swaps h with a buffer.
+  void set_before(SinglePoints& h) { candidate_.z.swap(h); }
   bool is_empty() const { return pairs_.empty(); }
 
   /// d = -H g; returns <g, d>. `length` > 0 means that the step length * d was made since the last call, at which
-  /// gradient and h were gradient_before and h_before. Its pair is then stored, unless <s, y> is not positive to rounding. If there are
-  /// `most_pairs` already, the oldest is dropped first, even if the new pair is then not stored. Pass 0 if no step was made, or after
-  /// clear(); then d = -gamma h.
-  double direction(const Points& gradient, const Points& gradient_before, const SinglePoints& h,
-                   const SinglePoints& h_before, double length, Points& d);
+  /// the gradient was gradient_before and h the h of that call or of set_before(). Its pair is then stored, unless <s, y> is not
+  /// positive to rounding. If there are `most_pairs` already, the oldest is dropped, even if the new pair is then not stored. Pass 0
+  /// if no step was made, or after clear() without set_before(); then d = -gamma h. Swaps h with a buffer: it is kept for the next call.
+  double direction(const Points& gradient, const Points& gradient_before, SinglePoints& h, double length,
+                   Points& d);
 
  private:
   struct Pair {
-    std::vector<float> s, z;
+    SinglePoints s, z;
     std::vector<double> sy, zy;  // <s_i, y>, <z_i, y> with this pair's y, for all older pairs i and this one
   };
   std::vector<KeptPair> kept() const;
   std::vector<double> products(const Points& gradient, const Points& gradient_before, const SinglePoints& h,
-                               const SinglePoints& h_before, double length, const Points& d);
-  void make_room();
+                               double length, const Points& d);
+  void drop_oldest();
   void take_in(const std::vector<double>& sums);
 
   Workers workers_;
   const std::size_t most_pairs_;
   std::vector<Pair> pairs_;  // oldest first
-  Pair candidate_;           // buffer for the next pair
+  Pair candidate_;           // of the next pair: until it is made, z is the h before
   std::vector<double> chunk_sums_;
   double gamma_ = 1;
 };

@@ -33,6 +33,13 @@ void Problem::precondition(const Points& b, Points& x) const {
   constraints.linear.project(metric, inverse, x, workers());
 }
 
+void Problem::precondition(const Points& b, SinglePoints& x) const {
+  if (constraints.linear.empty()) return metric.precondition(b, x, workers());
+  Points precise;
+  precondition(b, precise);
+  x = precise.cast<float>();
+}
+
 void restrict_to_free(const Constraints& constraints, Points& values) {
   for (Eigen::Index i = 0; i < values.rows(); ++i) {
     if (constraints.is_held[i]) values.row(i).setZero();

@@ -42,6 +42,7 @@ struct Problem {
   void solve(const Points& b, Points& x) const;
   /// The same to single precision, several times as fast.
   void precondition(const Points& b, Points& x) const;
+  void precondition(const Points& b, SinglePoints& x) const;
 };
 
 /// How an iteration went.

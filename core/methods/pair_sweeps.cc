@@ -69,7 +69,7 @@ void SweepProducts(const NewPair& pair, std::span<const KeptPair> kept, std::siz
       y[k] = g[k] - pair.gradient_before[at + k];
       h[k] = static_cast<double>(pair.h[at + k]);
       pair.s[at + k] = static_cast<float>(pair.length * pair.step[at + k]);
-      pair.z[at + k] = pair.h[at + k] - pair.h_before[at + k];
+      pair.z[at + k] = pair.h[at + k] - pair.z[at + k];
     }
     sums[0] += product(pair.step + at, pair.step + at, count);
     sums[1] += product(y, y, count);

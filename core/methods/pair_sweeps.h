@@ -8,10 +8,11 @@ namespace lpdeform {
 /// The inputs and outputs for a new pair of L-BFGS; see LbfgsMemory::direction.
 struct NewPair {
   const double *gradient, *gradient_before;  // y = gradient - gradient_before
-  const float *h, *h_before;                 // z = h - h_before
-  const double* step;                        // s = length * step
+  const float* h;
+  const double* step;  // s = length * step
   double length;
-  float *s, *z;  // outputs
+  float* s;  // output
+  float* z;  // before the sweep h_before, after it z = h - h_before
 };
 
 /// A stored pair.

@@ -174,28 +174,16 @@ bool QuasiNewton::refresh_metric() {
   if (!problem_.factor_metric(metric_weights(), Metric::Precision::kSingle)) return false;
   if (problem_.metric.version() == version && problem_.metric.scale() == scale) return true;
   memory_.clear();
-  if (step_length_ > 0) find_preconditioned(gradient_before_);
+  if (step_length_ == 0) return true;
+  problem_.precondition(trial_, preconditioned_);
+  memory_.set_before(preconditioned_);
   return true;
-}
-
-/// preconditioned_ = M^-1 gradient.
-void QuasiNewton::find_preconditioned(const Points& gradient) {
-  problem_.precondition(gradient, trial_);
-  preconditioned_.resize(trial_.rows(), 3);
-  problem_.workers().for_chunks(static_cast<std::size_t>(trial_.size()), 3 * kChunk,
-                                [&](std::size_t, std::size_t begin, std::size_t end) {
-                                  std::transform(trial_.data() + begin, trial_.data() + end,
-                                                 preconditioned_.data() + begin,
-                                                 [](double value) { return static_cast<float>(value); });
-                                });
 }
 
 /// d = -H g with the H_0 of LbfgsMemory. Returns <g, d>.
 double QuasiNewton::direction() {
-  preconditioned_.swap(preconditioned_before_);
-  find_preconditioned(gradient_);
-  const double slope = memory_.direction(gradient_, gradient_before_, preconditioned_, preconditioned_before_,
-                                         step_length_, direction_);
+  problem_.precondition(gradient_, preconditioned_);
+  const double slope = memory_.direction(gradient_, trial_, preconditioned_, step_length_, direction_);
   problem_.constraints.linear.restrict(direction_);  // pairs are kept in single precision
   step_length_ = 0;
   return slope;
@@ -265,7 +253,7 @@ StepResult QuasiNewton::give_up(double slope) {
 
 void QuasiNewton::accept(double length) {
   x_.swap(trial_);
-  gradient_.swap(gradient_before_);
+  gradient_.swap(trial_);
   find_gradient();
   step_length_ = last_length_ = length;
   ++stage_iterations_, ++since_refresh_;

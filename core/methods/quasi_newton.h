@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <deque>
 #include <vector>
 
@@ -49,6 +50,9 @@ enum class Warmth {
 ///   -<g, d> / 2 > tolerance p f_k with a fresh metric and no decreasing step.
 class QuasiNewton : public Minimiser {
  public:
+  /// What it holds of each vertex: 4 states, gradients and directions, and in single precision 6 pairs of L-BFGS and one gradient.
+  static constexpr std::size_t kBytesPerVertex = 4 * 3 * sizeof(double) + 13 * 3 * sizeof(float);
+
   QuasiNewton(Problem problem, Points x, Warmth warmth);
 
   StepResult step() override;
@@ -64,7 +68,6 @@ class QuasiNewton : public Minimiser {
   std::vector<double> metric_weights() const;
   bool adopt_metric();
   void find_gradient();
-  void find_preconditioned(const Points& gradient);
   void forget();
   bool refresh_metric();
   double direction();
@@ -83,11 +86,11 @@ class QuasiNewton : public Minimiser {
   LpNorm norm_;  // the stage's norm
   bool is_true_norm_ = false;
   Points x_, direction_;
-  Points trial_;                                         // or workspace
-  Points gradient_, gradient_before_;                    // before the last step
-  SinglePoints preconditioned_, preconditioned_before_;  // M^-1 times the gradients
-  double last_length_ = 1;                               // the last step's length
-  double step_length_ = 0;  // of the last step along direction_, while its pair is not stored yet
+  Points trial_;  // while step_length_ > 0, the gradient before that step
+  Points gradient_;
+  SinglePoints preconditioned_;  // M^-1 times a gradient, until memory_ takes it
+  double last_length_ = 1;       // the last step's length
+  double step_length_ = 0;       // of the last step along direction_, while its pair is not stored yet
   double objective_ = 0;
   double smoothing_sum_ = 0;  // part of objective_; if p is mixed, in the last stage
   double true_sum_ = 0;       // the sum of problem_.norm at x_

@@ -5,13 +5,14 @@
 #include <numeric>
 #include <utility>
 
+#include "core/methods/quasi_newton.h"
+
 namespace lpdeform {
 namespace {
 
 constexpr double kShare = 0.8;    // of the sum of E_i^q that the cells have which stay; q is the largest p_i,
 constexpr double kMostPower = 3;  // but at most this: at a large p other cells come to be the worst ones
-constexpr double kMostChosen = 0.2;     // of the fine vertices, before the ring around them is added
-constexpr std::size_t kWorkspace = 12;  // of a running solver, in positions of all vertices
+constexpr double kMostChosen = 0.2;  // of the fine vertices, before the ring around them is added
 
 /// The coarse vertices with the largest amounts for each fine vertex, until they have kShare of the sum, and the ring around them.
 /// `amount` and `share`, the number of fine vertices, are of each coarse vertex.
@@ -38,18 +39,23 @@ std::vector<char> largest(const RestShape& coarse, const std::vector<double>& am
   return result;
 }
 
+/// The vertices of a level that has those that stay, and a sixth of the others.
+std::int32_t size_with(const std::vector<char>& stays) {
+  const auto all = static_cast<std::int32_t>(stays.size());
+  const auto kept = static_cast<std::int32_t>(std::count(stays.begin(), stays.end(), 1));
+  return kept + (all - kept) / CoarseLevel::kRatio;
+}
+
 }  // namespace
 
 GradedLevel::GradedLevel(std::unique_ptr<CoarseLevel> level, const RestShape& fine)
     : level_(std::move(level)), before_(level_->pose(fine)) {}
 
-std::unique_ptr<GradedLevel> GradedLevel::create(const CoarseLevel& coarse, const FineInputs& fine,
-                                                 const Points& x, const std::vector<double>& squared_energies,
-                                                 double largest_p, const MakeLevelSolver& make_solver,
-                                                 const std::stop_token& stop) {
+std::vector<char> GradedLevel::chosen(const CoarseLevel& coarse, const std::vector<double>& squared_energies,
+                                      double largest_p) {
   const double power = 0.5 * std::min(largest_p, kMostPower);
   const double typical = *std::max_element(squared_energies.begin(), squared_energies.end());
-  if (!(typical > 0) || !std::isfinite(typical)) return nullptr;
+  if (!(typical > 0) || !std::isfinite(typical)) return {};
   std::vector<double> amount(coarse.share_.size(), 0.0);
   for (std::size_t v = 0; v < squared_energies.size(); ++v)
     amount[coarse.coarse_vertex_[v]] += std::pow(squared_energies[v] / typical, power);
@@ -57,11 +63,15 @@ std::unique_ptr<GradedLevel> GradedLevel::create(const CoarseLevel& coarse, cons
 
   std::vector<char> stays(squared_energies.size());
   for (std::size_t v = 0; v < stays.size(); ++v) stays[v] = is_chosen[coarse.coarse_vertex_[v]];
-  const auto all = static_cast<std::int32_t>(stays.size());
-  const auto kept = static_cast<std::int32_t>(std::count(stays.begin(), stays.end(), 1));
-  const std::int32_t wanted = kept + (all - kept) / CoarseLevel::kRatio;
-  if (wanted > kLargest * all) return nullptr;
-  CoarseMesh mesh = coarsen({fine.shape.positions(), fine.shape.faces()}, wanted, stays);
+  if (size_with(stays) > kLargest * static_cast<double>(stays.size())) return {};
+  return stays;
+}
+
+std::unique_ptr<GradedLevel> GradedLevel::create(const FineInputs& fine, const Points& x,
+                                                 const std::vector<char>& stays,
+                                                 const MakeLevelSolver& make_solver,
+                                                 const std::stop_token& stop) {
+  CoarseMesh mesh = coarsen({fine.shape.positions(), fine.shape.faces()}, size_with(stays), stays);
   if (stop.stop_requested()) return nullptr;
   std::unique_ptr<CoarseLevel> level = CoarseLevel::create(fine.shape, std::move(mesh), make_solver);
   if (stop.stop_requested()) return nullptr;
@@ -87,7 +97,7 @@ absl::Status GradedLevel::start(double tolerance, std::stop_token stop) {
 
 std::size_t GradedLevel::memory_bytes() const {
   return level_->memory_bytes() + before_.memory_bytes() +
-         kWorkspace * 3 * sizeof(double) * level_->share_.size();
+         QuasiNewton::kBytesPerVertex * level_->share_.size();
 }
 
 Points GradedLevel::moved(const RestShape& fine, const Points& x, const Workers& workers) const {

@@ -16,13 +16,15 @@ class GradedLevel {
  public:
   static constexpr double kLargest = 0.45;  // the level's vertices, as a share of the fine ones
 
-  /// For the fine state x (scaled units), which has the E_i^2 `squared_energies` and which `coarse` has led to. `largest_p` is the
-  /// largest p_i. Null if the distortion is spread so widely that the level would be too large, if no solver takes it, or once `stop`
-  /// is requested: at a million vertices it takes two seconds.
-  static std::unique_ptr<GradedLevel> create(const CoarseLevel& coarse, const FineInputs& fine,
-                                             const Points& x, const std::vector<double>& squared_energies,
-                                             double largest_p, const MakeLevelSolver& make_solver,
-                                             const std::stop_token& stop);
+  /// Which fine vertices such a level has, for a state with the E_i^2 `squared_energies`. `largest_p` is the largest p_i. Empty if
+  /// the distortion is spread so widely that the level would be too large, or if there is none.
+  static std::vector<char> chosen(const CoarseLevel& coarse, const std::vector<double>& squared_energies,
+                                  double largest_p);
+  /// With the vertices that chosen() has found, at the fine state x (scaled units). Null if no solver takes it, or once `stop` is
+  /// requested: at a million vertices it takes two seconds.
+  static std::unique_ptr<GradedLevel> create(const FineInputs& fine, const Points& x,
+                                             const std::vector<char>& stays,
+                                             const MakeLevelSolver& make_solver, const std::stop_token& stop);
 
   /// Begins to solve from x, as after a coarse level. Then call solver().step() until it returns false.
   absl::Status start(double tolerance, std::stop_token stop);

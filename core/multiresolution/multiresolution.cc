@@ -137,14 +137,23 @@ bool Multiresolution::begin_to_ease() {
   return level_.solver().start(settings, problem_.stop).ok();
 }
 
-/// Begins a graded level from x, if there is to be one. False if not.
-bool Multiresolution::begin_graded() {
-  if (!grading_) return false;
+/// The vertices of the graded level, if there is to be one at the last evaluation's state. Otherwise empty, then and later.
+std::vector<char> Multiresolution::chosen_for_graded() {
+  std::vector<char> stays;
+  if (!grading_) return stays;
+  stays =
+      GradedLevel::chosen(level_, problem_.objective.cells().squared_energies(), problem_.norm.highest_p());
+  if (stays.empty()) grading_.reset();
+  return stays;
+}
+
+/// Begins a graded level from x, the last evaluation's state. False if there is to be none.
+bool Multiresolution::begin_graded(const std::vector<char>& stays) {
+  if (stays.empty()) return false;
   const Grading grading = *std::exchange(grading_, std::nullopt);
-  objective_ = problem_.objective.evaluate(x_, problem_.norm);
+  objective_ = problem_.objective.sum(problem_.norm);
   const FineInputs inputs{problem_.shape(), grading.handles, problem_.constraints, grading.material, 1};
-  graded_ = GradedLevel::create(level_, inputs, x_, problem_.objective.cells().squared_energies(),
-                                problem_.norm.highest_p(), grading.make_solver, problem_.stop);
+  graded_ = GradedLevel::create(inputs, x_, stays, grading.make_solver, problem_.stop);
   looked_at_ = 0;
   const double tolerance = problem_.norm.highest_p() > 2 ? kGradedToleranceAtLargeP : kGradedTolerance;
   if (graded_ && graded_->start(std::max(problem_.tolerance, tolerance), problem_.stop).ok()) return true;
@@ -154,11 +163,13 @@ bool Multiresolution::begin_graded() {
 
 /// Lets a graded level go on from the fine state, if there is to be one and it is time for it.
 void Multiresolution::leave_fine() {
-  if (!grading_ || fine_iterations_ < kFirstFine) return;
+  if (fine_iterations_ != kFirstFine) return;
+  const std::vector<char> stays = chosen_for_graded();
+  if (stays.empty()) return;
   x_ = fine_->x();
   fine_.reset();  // it would take memory beside the graded level
   stages_before_ = stage_ + 1;
-  if (!begin_graded()) fine_ = std::make_unique<QuasiNewton>(problem_, std::move(x_), Warmth::kPrepared);
+  if (!begin_graded(stays)) fine_ = std::make_unique<QuasiNewton>(problem_, std::move(x_), Warmth::kPrepared);
 }
 
 /// x, moved along with the graded level, and evened out if that lowers its energy. Not always finite.
@@ -175,10 +186,12 @@ Points Multiresolution::moved_with_graded() const {
 
 /// The fine level goes on from the result of the graded level, unless that is much worse than where it was.
 void Multiresolution::end_graded() {
-  Points found = moved_with_graded();
+  const bool has_moved = graded_->solver().iterations() > 0;
+  Points found = has_moved ? moved_with_graded() : x_;
   graded_.reset();
   const double most = std::pow(kMostAfterGraded, problem_.norm.lowest_p()) * objective_;
-  const bool is_good = found.allFinite() && problem_.objective.evaluate(found, problem_.norm) < most;
+  const bool is_good =
+      has_moved && found.allFinite() && problem_.objective.evaluate(found, problem_.norm) < most;
   if (is_good)
     x_.swap(found);
   else
@@ -198,7 +211,7 @@ void Multiresolution::end_coarse() {
     problem_.objective.evaluate(x_, problem_.norm);
   }
   if (!is_better) grading_.reset();
-  if (problem_.norm.highest_p() > 2 && begin_graded()) return;
+  if (problem_.norm.highest_p() > 2 && begin_graded(chosen_for_graded())) return;
   fine_ =
       std::make_unique<QuasiNewton>(problem_, std::move(x_), is_better ? Warmth::kPrepared : Warmth::kCold);
 }

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "core/methods/minimiser.h"
 #include "core/methods/quasi_newton.h"
@@ -56,7 +57,8 @@ class Multiresolution : public Minimiser {
   void make_feasible(Points& found) const;
   void even_out(Points& found) const;
   bool begin_to_ease();
-  bool begin_graded();
+  bool begin_graded(const std::vector<char>& stays);
+  std::vector<char> chosen_for_graded();
   void leave_fine();
   Points moved_with_graded() const;
   void end_graded();

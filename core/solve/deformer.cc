@@ -15,13 +15,10 @@
 namespace lpdeform {
 namespace {
 
-// What a running solve holds, in positions of all vertices: QuasiNewton has 5 states, gradients and directions, and in single precision
-// 2 more and 6 pairs of L-BFGS.
-constexpr std::size_t kWorkspace = 12;
-// The same while a graded level runs.
-constexpr std::size_t kWorkspaceOfLevel = 3;
-// What a Deformer holds besides: x, positions, x_before_move, energies and weights.
-constexpr std::size_t kStates = 4;
+// What a running solve holds of each vertex, and the same while a graded level runs.
+constexpr std::size_t kWorkspace = QuasiNewton::kBytesPerVertex, kWorkspaceOfLevel = 9 * sizeof(double);
+// What a Deformer holds of each vertex besides: x, positions, x_before_move, energies and weights.
+constexpr std::size_t kStates = 12 * sizeof(double);
 constexpr std::size_t kCellBytes = 60, kEdgeBytes = 30;  // of CellPass: per vertex, per directed edge
 constexpr std::size_t kCoarseShare = 4;                  // the coarse levels take about 1 / kCoarseShare more
 constexpr std::int32_t kCoarsenBeforehand = 10000;  // vertices from which on cold solves have a coarse level
@@ -29,15 +26,14 @@ constexpr std::int32_t kCoarsenBeforehand = 10000;  // vertices from which on co
 /// Memory of a Deformer without its metric.
 std::size_t bytes_beside_metric(const RestShape& shape) {
   const auto n = static_cast<std::size_t>(shape.vertex_count());
-  return n * ((kWorkspace + kStates) * 3 * sizeof(double) + kCellBytes) +
-         kEdgeBytes * shape.neighbours().size();
+  return n * (kWorkspace + kStates + kCellBytes) + kEdgeBytes * shape.neighbours().size();
 }
 
 /// What a graded level takes at most, beyond the workspace that the solver of the fine level does not have while it runs.
 std::size_t bytes_of_graded_level(const RestShape& shape, std::size_t own) {
   const auto level = static_cast<std::size_t>(GradedLevel::kLargest * static_cast<double>(own));
   const std::size_t unused =
-      (kWorkspace - kWorkspaceOfLevel) * 3 * sizeof(double) * static_cast<std::size_t>(shape.vertex_count());
+      (kWorkspace - kWorkspaceOfLevel) * static_cast<std::size_t>(shape.vertex_count());
   return std::max(level, unused) - unused;
 }
 
@@ -288,9 +284,9 @@ std::vector<Eigen::Matrix3d> Deformer::rotations() {
 }
 
 std::size_t Deformer::memory_bytes() const {
-  const std::size_t points = impl_->x.size() * sizeof(double);
+  const auto n = static_cast<std::size_t>(impl_->shape->vertex_count());
   const std::size_t levels = impl_->minimiser ? impl_->minimiser->level_bytes() : 0;
-  return idle_memory_bytes() + std::max(kWorkspace * points, kWorkspaceOfLevel * points + levels);
+  return idle_memory_bytes() + std::max(kWorkspace * n, kWorkspaceOfLevel * n + levels);
 }
 
 std::size_t Deformer::idle_memory_bytes() const {

@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <map>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "core/linalg/cholesky.h"
 
@@ -33,6 +35,27 @@ inline LowerMatrix lower(const Eigen::MatrixXd& a) {
   }
   return result;
 }
+
+/// The rows of a LowerMatrix, which must outlive it.
+class RowsOf : public SymmetricRows {
+ public:
+  explicit RowsOf(const LowerMatrix& matrix)
+      : matrix_(matrix), above_(static_cast<std::size_t>(matrix.size())) {
+    for (std::int32_t j = 0; j < matrix.size(); ++j) {
+      for (std::int32_t k = matrix.columns[j] + 1; k < matrix.columns[j + 1]; ++k)
+        above_[static_cast<std::size_t>(matrix.rows[k])].push_back({j, k});
+    }
+  }
+  void append_row(std::int32_t i, std::vector<Entry>& to) const override {
+    for (std::int32_t k = matrix_.columns[i]; k < matrix_.columns[i + 1]; ++k)
+      to.push_back({matrix_.rows[k], matrix_.values[k]});
+    for (const auto& [j, k] : above_[static_cast<std::size_t>(i)]) to.push_back({j, matrix_.values[k]});
+  }
+
+ private:
+  const LowerMatrix& matrix_;
+  std::vector<std::vector<std::pair<std::int32_t, std::int32_t>>> above_;  // column and entry, of each row
+};
 
 inline LowerMatrix with_shortcuts(const LowerMatrix& matrix, int count) {
   std::mt19937 random(9);

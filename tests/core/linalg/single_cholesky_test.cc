@@ -12,14 +12,15 @@ namespace lpdeform {
 namespace {
 
 SingleCholesky analysed(const LowerMatrix& matrix) {
-  return {matrix, analyse_supernodes(matrix).value()};
+  return SingleCholesky(analyse_supernodes(matrix).value());
 }
 
 TEST(SingleCholesky, FactorsNarrowAndWideSupernodes) {
   for (const auto& [size, width] : {std::pair{1, 1}, {60, 1}, {200, 4}, {150, 149}, {400, 100}}) {
     const Eigen::MatrixXd a = banded(size, width);
-    SingleCholesky single = analysed(lower(a));
-    ASSERT_TRUE(single.factor(lower(a), Workers(1)));
+    const LowerMatrix matrix = lower(a);
+    SingleCholesky single = analysed(matrix);
+    ASSERT_TRUE(single.factor(RowsOf(matrix), Workers(1)));
     const Points expected = Points::Random(size, 3);
     Points x;
     single.result().solve(Points(a * expected), x, Workers(1));
@@ -37,11 +38,11 @@ TEST(SingleCholesky, GivesTheSameBitsOnAnyNumberOfThreadsAndTheRightOnes) {
     Points expected, one, several;
     cholesky.solve(b, expected);
     SingleCholesky single = analysed(matrix);
-    ASSERT_TRUE(single.factor(matrix, Workers(1)));
+    ASSERT_TRUE(single.factor(RowsOf(matrix), Workers(1)));
     single.result().solve(b, one, Workers(1));
     EXPECT_LT((one - expected).cwiseAbs().maxCoeff(), 1e-5);
     for (const int threads : {2, 4}) {
-      ASSERT_TRUE(single.factor(matrix, Workers(threads)));
+      ASSERT_TRUE(single.factor(RowsOf(matrix), Workers(threads)));
       single.result().solve(b, several, Workers(threads));
       EXPECT_EQ(several, one);
     }
@@ -52,10 +53,10 @@ TEST(SingleCholesky, FactorsOtherValuesOfThePattern) {
   LowerMatrix matrix = square_laplacian(40);
   SingleCholesky single = analysed(matrix);
   Points b = Points::Random(1600, 3), first, second;
-  ASSERT_TRUE(single.factor(matrix, Workers(2)));
+  ASSERT_TRUE(single.factor(RowsOf(matrix), Workers(2)));
   single.result().solve(b, first, Workers(1));
   for (double& value : matrix.values) value *= 4;
-  ASSERT_TRUE(single.factor(matrix, Workers(2)));
+  ASSERT_TRUE(single.factor(RowsOf(matrix), Workers(2)));
   single.result().solve(b, second, Workers(1));
   EXPECT_LT((first - 4 * second).cwiseAbs().maxCoeff(), 1e-6);
 }
@@ -67,15 +68,16 @@ TEST(SingleCholesky, RefusesWhatSinglePrecisionDoesNotCarry) {
     SingleCholesky single = analysed(matrix);
     for (const std::int32_t j : {0, 5050, 9999}) {
       const double right = std::exchange(matrix.values[matrix.columns[j]], wrong);
-      EXPECT_FALSE(single.factor(matrix, Workers(2))) << wrong << " at " << j;
+      EXPECT_FALSE(single.factor(RowsOf(matrix), Workers(2))) << wrong << " at " << j;
       matrix.values[matrix.columns[j]] = right;
     }
-    EXPECT_TRUE(single.factor(matrix, Workers(2)));
+    EXPECT_TRUE(single.factor(RowsOf(matrix), Workers(2)));
   }
   // Definite, but by less than the digits of single precision.
   Eigen::MatrixXd a = Eigen::MatrixXd::Ones(2, 2);
   a(0, 0) += 1e-8;
-  EXPECT_FALSE(analysed(lower(a)).factor(lower(a), Workers(1)));
+  const LowerMatrix matrix = lower(a);
+  EXPECT_FALSE(analysed(matrix).factor(RowsOf(matrix), Workers(1)));
 }
 
 TEST(SupernodePattern, IsRefusedWhereTheFactorIsTooLarge) {

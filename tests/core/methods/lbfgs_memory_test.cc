@@ -23,10 +23,10 @@ class LbfgsMemoryTest : public testing::TestWithParam<int> {
 
   double direction(double length) {
     g_before_.swap(g_);
-    h_before_.swap(h_);
     g_ = hessian_.cwiseProduct(x_);
     h_ = g_.cwiseQuotient(metric_).cast<float>();
-    return memory_.direction(g_, g_before_, h_, h_before_, length, d_);
+    SinglePoints given = h_;
+    return memory_.direction(g_, g_before_, given, length, d_);
   }
 
   Points h() const { return h_.cast<double>(); }
@@ -57,7 +57,7 @@ class LbfgsMemoryTest : public testing::TestWithParam<int> {
   }
 
   Points hessian_{kCount, 3}, metric_{kCount, 3}, x_{kCount, 3}, g_, g_before_, d_;
-  SinglePoints h_, h_before_;
+  SinglePoints h_;
   std::vector<Points> steps_, changes_;
   LbfgsMemory memory_{Workers(GetParam()), 3};
 };
@@ -94,7 +94,7 @@ TEST_P(LbfgsMemoryTest, DropsTheOldestPairBeforeItKnowsTheNewOne) {
     walk(0.9);
     direction(0.9);
   }
-  memory_.direction(g_, g_, h_, h_, 0.9, d_);  // no curvature
+  memory_.direction(g_, g_, h_, 0.9, d_);  // no curvature
   const Points expected = -two_loop(g_, 2);
   EXPECT_LT((d_ - expected).norm(), kSingle * expected.norm());
 }
@@ -109,17 +109,32 @@ TEST_P(LbfgsMemoryTest, ForgetsWhenCleared) {
   EXPECT_NEAR(d_.cwiseProduct(h()).sum(), -d_.norm() * h().norm(), 1e-12 * d_.norm() * h().norm());
 }
 
+TEST_P(LbfgsMemoryTest, KeepsTheLastStepInAnotherMetric) {
+  direction(0);
+  walk(0.9);
+  direction(0.9);
+  walk(0.8);
+  memory_.clear();
+  metric_ *= 3;
+  SinglePoints before = g_.cwiseQuotient(metric_).cast<float>();
+  memory_.set_before(before);
+  direction(0.8);
+  const Points expected = -two_loop(g_, 1);
+  EXPECT_LT((d_ - expected).norm(), kSingle * expected.norm());
+}
+
 TEST(LbfgsMemory, GivesTheSameBitsOnAnyNumberOfThreads) {
   std::vector<Points> results;
   for (const int threads : {1, 2, 4}) {
     LbfgsMemory memory(Workers(threads), 2);
     const Points g0 = Points::Constant(kCount, 3, 1.25);
     Points d;
-    const SinglePoints h0 = g0.cast<float>();
-    memory.direction(g0, g0, h0, h0, 0, d);
+    SinglePoints h = g0.cast<float>();
+    memory.direction(g0, g0, h, 0, d);
     Points g1 = g0 / 3;
     for (Eigen::Index k = 0; k < g1.size(); ++k) g1.data()[k] += 1e-3 * std::sin(static_cast<double>(k));
-    memory.direction(g1, g0, g1.cast<float>(), h0, 1, d);
+    h = g1.cast<float>();
+    memory.direction(g1, g0, h, 1, d);
     results.push_back(d);
   }
   EXPECT_EQ(results[0], results[1]);
