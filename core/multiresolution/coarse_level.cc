@@ -137,7 +137,8 @@ std::optional<CoarseMotion> CoarseLevel::lead(const FineInputs& fine, const Poin
     before = pose(fine.shape);
   if (!restrict_inputs(fine).ok()) return std::nullopt;
   bend_like_fine();
-  if (!go_to_handles(most_iterations(fine.material), std::move(stop))) return std::nullopt;
+  if (!go_to_handles(InitialGuess::kCurrent, most_iterations(fine.material), std::move(stop)))
+    return std::nullopt;
   led_to_ = pose(fine.shape);
   CoarseMotion motion;
   motion.positions =
@@ -145,12 +146,13 @@ std::optional<CoarseMotion> CoarseLevel::lead(const FineInputs& fine, const Poin
   return motion;
 }
 
-std::optional<double> CoarseLevel::least_energy(const FineInputs& fine, std::stop_token stop) {
+std::optional<double> CoarseLevel::least_energy(const FineInputs& fine, InitialGuess initial,
+                                                std::stop_token stop) {
   if (!led_to_ && !has_level_below()) led_to_ = pose(fine.shape);
   if (!restrict_inputs(fine).ok()) return std::nullopt;
   bend_like_fine();
-  if (has_level_below()) return solver_->least_energy(std::move(stop));
-  if (!go_to_handles(kMostLeading, std::move(stop))) return std::nullopt;
+  if (has_level_below()) return solver_->least_energy(initial, std::move(stop));
+  if (!go_to_handles(initial, kMostLeading, std::move(stop))) return std::nullopt;
   return solver_->cell_energies().norm();
 }
 
@@ -161,9 +163,9 @@ int CoarseLevel::most_iterations(const Material& material) const {
   return std::clamp(leading.work / shape_->vertex_count(), leading.least, kMostLeading);
 }
 
-bool CoarseLevel::go_to_handles(int most_iterations, std::stop_token stop) {
+bool CoarseLevel::go_to_handles(InitialGuess initial, int most_iterations, std::stop_token stop) {
   SolveSettings settings;
-  settings.initial = InitialGuess::kCurrent;
+  settings.initial = initial;
   settings.method = Method::kQuasiNewton;
   settings.tolerance = kLeadingTolerance;
   settings.effort = 0;

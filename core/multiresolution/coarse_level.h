@@ -58,10 +58,10 @@ class CoarseLevel {
   /// not take the inputs. Only if can_lead().
   std::optional<CoarseMotion> lead(const FineInputs& fine, const Points* from, const Workers& workers,
                                    std::stop_token stop);
-  /// Takes the inputs over like lead(), and lets only the lowest level go to them. Returns the root of the sum of its E_i^2, in the
+  /// Takes the inputs over like lead(), and lets only the lowest level go to them, from `initial`. Returns the root of the sum of its E_i^2, in the
   /// caller's units: about what the fine level's minimum has. The levels above stay where they are. nullopt if a level does
   /// not take the inputs.
-  std::optional<double> least_energy(const FineInputs& fine, std::stop_token stop);
+  std::optional<double> least_energy(const FineInputs& fine, InitialGuess initial, std::stop_token stop);
   /// The fine level, which is at `x` (scaled units), goes on alone. The next lead() first moves the coarse levels as it has moved
   /// by then.
   void go_alone(const Points& x);
@@ -107,7 +107,7 @@ class CoarseLevel {
   absl::Status set_state(const RestShape& fine, const Points& positions);
   bool catch_up(const FineInputs& fine, const Points& x);
   int most_iterations(const Material& material) const;
-  bool go_to_handles(int most_iterations, std::stop_token stop);
+  bool go_to_handles(InitialGuess initial, int most_iterations, std::stop_token stop);
   Pose rest_pose(const RestShape& fine) const;
   Pose pose(const RestShape& fine) const;
   Points carried(const Points& from, const Pose& before, const Pose& now, const Workers& workers,

@@ -152,10 +152,10 @@ void Deformer::displace(const Points& by) {
   self.x_before_move.resize(0, 3);
 }
 
-std::optional<double> Deformer::least_energy(std::stop_token stop) {
+std::optional<double> Deformer::least_energy(InitialGuess initial, std::stop_token stop) {
   Impl& self = *impl_;
   if (!self.constraints || !self.make_coarse()) return std::nullopt;
-  return self.coarse->least_energy(self.coarse_inputs(self.effective_material()), std::move(stop));
+  return self.coarse->least_energy(self.coarse_inputs(self.effective_material()), initial, std::move(stop));
 }
 
 absl::Status Deformer::start(const SolveSettings& settings, std::stop_token stop) {

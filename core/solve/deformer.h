@@ -75,7 +75,7 @@ class Deformer {
   /// during a solve.
   void displace(const Points& by);
   /// Only for coarse levels: CoarseLevel::least_energy() of the level below. nullopt if there is none.
-  std::optional<double> least_energy(std::stop_token stop);
+  std::optional<double> least_energy(InitialGuess initial, std::stop_token stop);
 
   /// Begins a solve. Errors: FAILED_PRECONDITION (NO_HANDLES); INVALID_ARGUMENT (METHOD_NEEDS_P,
   /// METHOD_NEEDS_EXACT_HANDLES, TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE). `stop` is

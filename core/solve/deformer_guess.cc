@@ -12,9 +12,8 @@ constexpr double kFarthestGuess = 2;  // the guess continues the last move by le
 constexpr double kSameWay = 0.5;      // two moves count as one drag above this squared cosine between them
 // In such a drag, the squared ratio of the surface's largest move to the handles' largest move is below this.
 constexpr double kSteady = 9;
-constexpr double kMostAbove = 2;        // see is_good
-constexpr double kLittleAbove = 1.2;    // see is_as_good_as_before
-constexpr double kMostOverLeast = 1.8;  // see guess_alone
+constexpr double kMostAbove = 2;      // see is_good
+constexpr double kLittleAbove = 1.2;  // see is_as_good_as_before
 // Moves that coarse levels lead after guess_alone has refused, and where there was no time for an iteration after it.
 constexpr int kMovesToLead = 3, kMovesToLeadWithoutTime = 12;
 
@@ -152,23 +151,19 @@ Points Deformer::Impl::continued(const Points* forces) const {
 std::optional<Points> Deformer::Impl::guess_alone() {
   std::optional<double> least;
   Points guess;
-  workers().run_both([&] { least = coarse->least_energy(coarse_inputs(effective_material()), stop); },
-                     [&] {
-                       guess = continued(nullptr);
-                       for (const std::int32_t i : constraints->exact.vertices)
-                         guess.row(i) = constraints->targets.row(i);
-                     });
+  workers().run_both(
+      [&] {
+        least = coarse->least_energy(coarse_inputs(effective_material()), InitialGuess::kCurrent, stop);
+      },
+      [&] {
+        guess = continued(nullptr);
+        for (const std::int32_t i : constraints->exact.vertices) guess.row(i) = constraints->targets.row(i);
+      });
   if (!least || !guess.allFinite()) return std::nullopt;
   const double most = kMostOverLeast * *least / unit();
   if (!(objective.evaluate(guess, even_norm()) <= most * most)) return std::nullopt;
   is_guess_evaluated = true;
   return guess;
-}
-
-/// Whether guess_alone() may be tried. At another p than 2, or with soft targets, E^(1/2) does not tell how good a guess is.
-bool Deformer::Impl::can_go_alone() const {
-  return !is_coarse() && lead == Lead::kTogether && (material.p.array() == 2).all() &&
-         constraints->soft.empty() && constraints->linear.empty();
 }
 
 /// The guess of a solve that goes on from x: by the fine level alone, where that is good enough, or led by the coarse levels.
@@ -189,7 +184,7 @@ Points Deformer::Impl::current_guess() {
   if (had_no_time) moves_to_lead = kMovesToLeadWithoutTime;
   const bool is_to_lead = moves_to_lead > 0;
   if (is_to_lead) --moves_to_lead;
-  if (can_lead && can_go_alone() && !is_to_lead) {
+  if (can_lead && lead == Lead::kTogether && can_judge_guesses() && !is_to_lead) {
     if (std::optional<Points> alone = guess_alone()) {
       coarse->go_alone(x);
       x_before_move = x;

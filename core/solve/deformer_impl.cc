@@ -23,7 +23,8 @@ constexpr std::int32_t kLargestSearchedLevel =
 // Minima of a coarse level that differ by less than this may be in another order on the fine level. It counts where the fine
 // level is too large to be searched itself.
 constexpr double kLeastSavingOfLevel = 0.02;
-constexpr double kRounding = 1e-13;  // relative to the largest coordinate, in scaled units
+constexpr double kWorthGoing = 32000;  // vertices; see is_guess_good_enough
+constexpr double kRounding = 1e-13;    // relative to the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
 
@@ -33,8 +34,8 @@ class DeformerOfLevel : public LevelSolver {
 
   void set_bending(const Field& shares) override { deformer_->set_bending(shares); }
   void displace(const Points& by) override { deformer_->displace(by); }
-  std::optional<double> least_energy(std::stop_token stop) override {
-    return deformer_->least_energy(std::move(stop));
+  std::optional<double> least_energy(InitialGuess initial, std::stop_token stop) override {
+    return deformer_->least_energy(initial, std::move(stop));
   }
   absl::Status set_material(const Material& material) override { return deformer_->set_material(material); }
   absl::Status set_handles(const HandleSet& handles) override { return deformer_->set_handles(handles); }
@@ -161,12 +162,33 @@ bool Deformer::Impl::prepare_coarse() {
   return make_coarse() && coarse->take_over(coarse_inputs(effective_material())).ok();
 }
 
+/// Whether the lowest level's energy tells how good a guess is: not at another p than 2, or with soft targets.
+bool Deformer::Impl::can_judge_guesses() const {
+  return !is_coarse() && (material.p.array() == 2).all() && constraints->soft.empty() &&
+         constraints->linear.empty() && CoarseLevel::can_lead(*shape, least_bending());
+}
+
+/// Whether a cold solve does without a coarse level, because its guess, the last evaluation of `objective`, is good enough already:
+/// its E^(1/2) is at most kMostOverLeast or 1 + kWorthGoing / vertices times that of the lowest level. The limit is lower on large
+/// meshes, where what is left takes the fine level longer than the coarse levels.
+bool Deformer::Impl::is_guess_good_enough() const {
+  if (!least_of_lowest) return false;
+  const double most =
+      std::min(kMostOverLeast, 1 + kWorthGoing / shape->vertex_count()) * *least_of_lowest / unit();
+  return objective.sum(even_norm()) <= most * most;
+}
+
 Method Deformer::Impl::chosen_method(Method asked, bool is_warm) {
+  least_of_lowest.reset();
   if (asked == Method::kAuto) {
     const std::int32_t large = is_coarse()                       ? CoarseLevel::kLeastEasedLevel
                                : (material.p.array() == 2).all() ? kLargeAtTwo
                                                                  : kLargeMesh;
     asked = is_warm || shape->vertex_count() < large ? Method::kQuasiNewton : Method::kMultiresolution;
+    if (asked == Method::kMultiresolution && can_judge_guesses() && make_coarse()) {
+      least_of_lowest =
+          coarse->least_energy(coarse_inputs(effective_material()), InitialGuess::kLaplacian, stop);
+    }
   }
   if (asked != Method::kMultiresolution || (!is_warm && prepare_coarse())) return asked;
   return Method::kQuasiNewton;
@@ -333,6 +355,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   soft.set_length_unit(length_unit() / unit());
   objective.set_soft_terms(std::move(soft));
   const double typical = typical_energy(guess);
+  if (is_guess_good_enough()) settings.method = summary.method = Method::kQuasiNewton;
   const double reference = settings.method == Method::kLineSearch ? length_unit() / unit() : typical;
   norm.emplace(effective_material(), shape->vertex_count(), unit(), reference);
   objective.reweigh(*norm);  // typical_energy has evaluated the guess

@@ -31,6 +31,8 @@ struct Deformer::Impl {
         positions(shape->positions()) {}
 
   static constexpr std::int32_t kLargeMesh = 5000;  // vertices from which on a coarse level pays off
+  /// A guess whose E^(1/2) is at most this many times that of the lowest level needs no coarse level.
+  static constexpr double kMostOverLeast = 1.8;
 
   double unit() const { return shape->mean_edge_length(); }
   const Workers& workers() const { return objective.cells().workers(); }
@@ -39,7 +41,6 @@ struct Deformer::Impl {
   Points laplacian_guess();
   Points continued(const Points* forces) const;
   std::optional<Points> guess_alone();
-  bool can_go_alone() const;
   Points current_guess();
   std::optional<Points> led_guess();
   void follow(const Points& guess);
@@ -57,6 +58,8 @@ struct Deformer::Impl {
   double zero_squares() const;
   bool is_best_zero() const;
   Problem make_problem();
+  bool can_judge_guesses() const;
+  bool is_guess_good_enough() const;
   Method chosen_method(Method asked, bool is_warm);
   MakeLevelSolver level_maker() const;
   std::optional<Grading> grading() const;
@@ -155,9 +158,10 @@ struct Deformer::Impl {
   Warmth warmth = Warmth::kCold;
   bool is_guess_evaluated = false;  // whether `objective` holds the evaluation of the last initial_guess()
   std::stop_token stop;
-  std::optional<LpNorm> norm;           // true norm, and the reference of the running solve
-  std::unique_ptr<CoarseLevel> coarse;  // made when first needed
-  bool is_coarsest = false;             // it could not be made
+  std::optional<LpNorm> norm;             // true norm, and the reference of the running solve
+  std::unique_ptr<CoarseLevel> coarse;    // made when first needed
+  bool is_coarsest = false;               // it could not be made
+  std::optional<double> least_of_lowest;  // E^(1/2) of the lowest level; see is_guess_good_enough()
   enum class Lead {
     kNone,   // the coarse level's state has nothing to do with x
     kAhead,  // it is for the same inputs, but x is at most a look at it (Multiresolution::intermediate_state)

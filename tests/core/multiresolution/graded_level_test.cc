@@ -51,7 +51,9 @@ class KeepingSolver : public LevelSolver {
   absl::Status set_material(const Material& /*material*/) override { return absl::OkStatus(); }
   void set_bending(const Field& shares) override { *bending_ = shares; }
   void displace(const Points& /*by*/) override {}
-  std::optional<double> least_energy(std::stop_token /*stop*/) override { return std::nullopt; }
+  std::optional<double> least_energy(InitialGuess /*initial*/, std::stop_token /*stop*/) override {
+    return std::nullopt;
+  }
   absl::Status set_handles(const HandleSet& /*handles*/) override { return absl::OkStatus(); }
   absl::Status set_positions(const Points& positions) override {
     positions_ = positions;
