@@ -20,6 +20,9 @@ constexpr int kWindow = 20;
 /// Any other stage ends where f_(k - kWindow) - f_k <= kStageTolerance tolerance p f_k , or k >= kStageIterations .
 constexpr double kStageTolerance = 30;
 constexpr int kStageIterations = 60;
+/// Coarse levels have tolerances >= kRough . Their stages of smoothing may end so after kRoughWindow iterations.
+constexpr double kRough = 2e-3;
+constexpr int kRoughWindow = 5;
 
 /// The metric is refactored where r >= kRefresh , r the iterations since it was; or where t < kShortStep and r >= kSoonest .
 constexpr int kRefresh = 40, kSoonest = 2;
@@ -37,7 +40,7 @@ constexpr double kMostSmoothing = 30;
 constexpr double kLiveBias = 0.1;
 /// Smoothing has ended where eps^2 <= kLeastSmoothing diagonal^2 (rounding),
 constexpr double kLeastSmoothing = 1e-26;
-/// or where sum over p_i < 2 of eps^p_i <= kBias sum_i E_i^p_i .
+/// or where sum over p_i < 2 of eps^p_i <= b sum_i E_i^p_i , b the tolerance, but at least kBias and at most kLeastBias.
 constexpr double kBias = 3e-4;
 /// What was minimised is the true objective F where f - F <= kLeastBias F . Else the solve has stalled, not converged.
 constexpr double kLeastBias = 0.01;
@@ -124,7 +127,8 @@ double QuasiNewton::smoothing_sum() const {
 /// compared with the sum, or a smaller eps would be lost in rounding.
 bool QuasiNewton::is_smooth_enough() const {
   if (eps2_ <= kLeastSmoothing * problem_.diagonal * problem_.diagonal) return true;
-  return smoothing_sum() <= kBias * problem_.objective.sum(problem_.norm);
+  const double bias = std::clamp(problem_.tolerance, kBias, kLeastBias);
+  return smoothing_sum() <= bias * problem_.objective.sum(problem_.norm);
 }
 
 /// Whether the last stage has minimised the true objective, except for a small share that smoothing adds.
@@ -219,7 +223,9 @@ double QuasiNewton::search(double slope) {
 }
 
 bool QuasiNewton::is_stage_over() const {
-  if (history_.size() <= kWindow) return false;
+  const bool is_smoothing = !is_last_stage_ && stage_ >= static_cast<int>(shares_.size());
+  const int window = is_smoothing && problem_.tolerance >= kRough ? kRoughWindow : kWindow;
+  if (static_cast<int>(history_.size()) <= window) return false;
   const double tolerance = (is_last_stage_ ? 1 : kStageTolerance) * problem_.tolerance;
   const double to_lower = std::max(0.0, history_.back() - smoothing_sum_);
   return history_.front() - history_.back() <= tolerance * norm_.highest_p() * to_lower;
