@@ -87,8 +87,9 @@ bool Metric::factor_double() const {
 
 /// Sorts entries_ by row, for Rows.
 void Metric::index_entries() {
-  by_row_ = entries_;
+  by_row_.clear();
   for (const MatrixEntry& entry : entries_) {
+    by_row_.push_back(entry);
     if (entry.row != entry.column) by_row_.push_back({entry.column, entry.row, entry.value});
   }
   std::stable_sort(by_row_.begin(), by_row_.end(),

@@ -104,6 +104,7 @@ void SingleCholesky::load(std::size_t node, const SymmetricRows& matrix, Scratch
       if (row < column) continue;
       const auto r = static_cast<std::size_t>(own.place[row]);
       LPDEFORM_CHECK(r < columns + at.row_count);
+      LPDEFORM_CHECK(row == (r < columns ? at.first_column + own.place[row] : rows[r - columns]));
       block[r * columns + c] = static_cast<float>(entry.value);
     }
   }

@@ -20,7 +20,8 @@ constexpr int kWindow = 20;
 /// Any other stage ends where f_(k - kWindow) - f_k <= kStageTolerance tolerance p f_k , or k >= kStageIterations .
 constexpr double kStageTolerance = 30;
 constexpr int kStageIterations = 60;
-/// Coarse levels have tolerances >= kRough . Their stages of smoothing may end so after kRoughWindow iterations.
+/// Where the tolerance is >= kRough , as on most coarse levels, a stage of smoothing may end so as soon as k > kRoughWindow : while
+/// k <= kWindow , with f_0 in place of f_(k - kWindow) .
 constexpr double kRough = 2e-3;
 constexpr int kRoughWindow = 5;
 

@@ -152,8 +152,9 @@ std::optional<double> CoarseLevel::least_energy(const FineInputs& fine, InitialG
   if (!restrict_inputs(fine).ok()) return std::nullopt;
   bend_like_fine();
   if (has_level_below()) return solver_->least_energy(initial, std::move(stop));
-  if (!go_to_handles(initial, kMostLeading, std::move(stop))) return std::nullopt;
-  return solver_->cell_energies().norm();
+  if (!go_to_handles(initial, kMostLeading, std::move(stop)) || solver_->iterations() == 0)
+    return std::nullopt;
+  return solver_->energy();
 }
 
 int CoarseLevel::most_iterations(const Material& material) const {

@@ -58,9 +58,9 @@ class CoarseLevel {
   /// not take the inputs. Only if can_lead().
   std::optional<CoarseMotion> lead(const FineInputs& fine, const Points* from, const Workers& workers,
                                    std::stop_token stop);
-  /// Takes the inputs over like lead(), and lets only the lowest level go to them, from `initial`. Returns the root of the sum of its E_i^2, in the
-  /// caller's units: about what the fine level's minimum has. The levels above stay where they are. nullopt if a level does
-  /// not take the inputs.
+  /// Takes the inputs over like lead(), and lets only the lowest level go to them, from `initial`. Returns its E, in the
+  /// caller's units: at p = 2, about what the fine level's minimum has. The levels above stay where they are. nullopt if a level does
+  /// not take the inputs, or if the lowest one makes no iteration.
   std::optional<double> least_energy(const FineInputs& fine, InitialGuess initial, std::stop_token stop);
   /// The fine level, which is at `x` (scaled units), goes on alone. The next lead() first moves the coarse levels as it has moved
   /// by then.

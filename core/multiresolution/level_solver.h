@@ -33,7 +33,8 @@ class LevelSolver {
   /// Whether the last solve's search has found a minimum lower than its first, and has taken it (SolveSettings::effort).
   virtual bool has_found_lower() const = 0;
   virtual const Points& positions() const = 0;
-  virtual const Field& cell_energies() const = 0;
+  /// SolveSummary::energy of the last solve.
+  virtual double energy() const = 0;
   virtual std::vector<Eigen::Matrix3d> rotations() = 0;
   /// Between its solves: it does not run while the finer level does.
   virtual std::size_t memory_bytes() const = 0;

@@ -160,8 +160,8 @@ std::optional<Points> Deformer::Impl::guess_alone() {
         for (const std::int32_t i : constraints->exact.vertices) guess.row(i) = constraints->targets.row(i);
       });
   if (!least || !guess.allFinite()) return std::nullopt;
-  const double most = kMostOverLeast * *least / unit();
-  if (!(objective.evaluate(guess, even_norm()) <= most * most)) return std::nullopt;
+  objective.evaluate(guess, even_norm());
+  if (!is_near(*least, kMostOverLeast)) return std::nullopt;
   is_guess_evaluated = true;
   return guess;
 }

@@ -54,7 +54,7 @@ class DeformerOfLevel : public LevelSolver {
     return !summary.minima.empty() && summary.energy < summary.minima.front();
   }
   const Points& positions() const override { return deformer_->positions(); }
-  const Field& cell_energies() const override { return deformer_->cell_energies(); }
+  double energy() const override { return deformer_->summary().energy; }
   std::vector<Eigen::Matrix3d> rotations() override { return deformer_->rotations(); }
   std::size_t memory_bytes() const override { return deformer_->idle_memory_bytes(); }
 
@@ -168,14 +168,18 @@ bool Deformer::Impl::can_judge_guesses() const {
          constraints->linear.empty() && CoarseLevel::can_lead(*shape, least_bending());
 }
 
-/// Whether a cold solve does without a coarse level, because its guess, the last evaluation of `objective`, is good enough already:
-/// its E^(1/2) is at most kMostOverLeast or 1 + kWorthGoing / vertices times that of the lowest level. The limit is lower on large
-/// meshes, where what is left takes the fine level longer than the coarse levels.
+/// Whether the E^(1/2) of the last evaluation of `objective` is at most `times` that of the lowest level. At p = 2. Stiffness counts: where
+/// it is low, large E_i are no sign of a bad guess.
+bool Deformer::Impl::is_near(double least, double times) const {
+  const LpNorm weighted(effective_material(), shape->vertex_count(), unit(), 1);
+  return weighted.true_energy(objective.sum(weighted)) <= times * times * least;
+}
+
+/// Whether a cold solve does without a coarse level, because its guess, the last evaluation of `objective`, is good enough already. The
+/// limit is lower on large meshes, where what is left takes the fine level longer than the coarse levels.
 bool Deformer::Impl::is_guess_good_enough() const {
-  if (!least_of_lowest) return false;
-  const double most =
-      std::min(kMostOverLeast, 1 + kWorthGoing / shape->vertex_count()) * *least_of_lowest / unit();
-  return objective.sum(even_norm()) <= most * most;
+  return least_of_lowest &&
+         is_near(*least_of_lowest, std::min(kMostOverLeast, 1 + kWorthGoing / shape->vertex_count()));
 }
 
 Method Deformer::Impl::chosen_method(Method asked, bool is_warm) {

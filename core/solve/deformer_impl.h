@@ -59,6 +59,7 @@ struct Deformer::Impl {
   bool is_best_zero() const;
   Problem make_problem();
   bool can_judge_guesses() const;
+  bool is_near(double least, double times) const;
   bool is_guess_good_enough() const;
   Method chosen_method(Method asked, bool is_warm);
   MakeLevelSolver level_maker() const;
@@ -161,7 +162,7 @@ struct Deformer::Impl {
   std::optional<LpNorm> norm;             // true norm, and the reference of the running solve
   std::unique_ptr<CoarseLevel> coarse;    // made when first needed
   bool is_coarsest = false;               // it could not be made
-  std::optional<double> least_of_lowest;  // E^(1/2) of the lowest level; see is_guess_good_enough()
+  std::optional<double> least_of_lowest;  // E of the lowest level; see is_guess_good_enough()
   enum class Lead {
     kNone,   // the coarse level's state has nothing to do with x
     kAhead,  // it is for the same inputs, but x is at most a look at it (Multiresolution::intermediate_state)

@@ -36,7 +36,7 @@ inline LowerMatrix lower(const Eigen::MatrixXd& a) {
   return result;
 }
 
-/// The rows of a LowerMatrix, which must outlive it.
+/// The rows of a LowerMatrix. The matrix must outlive this.
 class RowsOf : public SymmetricRows {
  public:
   explicit RowsOf(const LowerMatrix& matrix)

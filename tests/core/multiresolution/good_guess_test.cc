@@ -74,6 +74,16 @@ TEST_F(GoodGuessTest, IsNotToldAtAnotherPOrWithSoftHandles) {
   EXPECT_EQ(taken(soft, Material::uniform(2)), Method::kMultiresolution);
 }
 
+/// At a soft hinge even a good shape has large E_i. They say nothing of the guess, which is far from the minimum here.
+TEST_F(GoodGuessTest, IsJudgedWithTheStiffness) {
+  Material hinge = Material::uniform(2);
+  hinge.stiffness = Field::Ones(shape->vertex_count());
+  for (Eigen::Index v = 0; v < hinge.stiffness.size(); ++v) {
+    if (std::abs(mesh.vertices(v, 0) - 0.5 * kSide) < 10) hinge.stiffness[v] = 1e-3;
+  }
+  EXPECT_EQ(taken(turned(), hinge), Method::kMultiresolution);
+}
+
 TEST_F(GoodGuessTest, EndsInTheSameMinimum) {
   const auto solve = [&](Method method) {
     return deformer(shape, lifted(), Material::uniform(2))->solve(settings(method)).value().energy;
