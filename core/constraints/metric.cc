@@ -40,7 +40,7 @@ absl::StatusOr<Metric> Metric::create(std::shared_ptr<const RestShape> shape, co
         admit(entry_count(*supernodes) * sizeof(float) + kBytesPerEntry * matrix.rows.size());
     if (!status.ok()) return status;
   }
-  matrix = {};
+  matrix = {};  // its memory is free for the factor
   return Metric(std::move(shape), *supernodes);
 }
 

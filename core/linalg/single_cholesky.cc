@@ -103,7 +103,7 @@ void SingleCholesky::load(std::size_t node, const SymmetricRows& matrix, Scratch
       const std::int32_t row = old_to_new_[entry.column];
       if (row < column) continue;
       const auto r = static_cast<std::size_t>(own.place[row]);
-      LPDEFORM_CHECK(r < columns + at.row_count);
+      LPDEFORM_CHECK(r < columns + at.row_count);  // place may have it from another supernode
       LPDEFORM_CHECK(row == (r < columns ? at.first_column + own.place[row] : rows[r - columns]));
       block[r * columns + c] = static_cast<float>(entry.value);
     }

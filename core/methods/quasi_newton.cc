@@ -20,8 +20,8 @@ constexpr int kWindow = 20;
 /// Any other stage ends where f_(k - kWindow) - f_k <= kStageTolerance tolerance p f_k , or k >= kStageIterations .
 constexpr double kStageTolerance = 30;
 constexpr int kStageIterations = 60;
-/// Where the tolerance is >= kRough , as on most coarse levels, a stage of smoothing may end so as soon as k > kRoughWindow : while
-/// k <= kWindow , with f_0 in place of f_(k - kWindow) .
+/// At tolerances >= kRough , which most coarse levels have, a stage of smoothing may end sooner, from k = kRoughWindow on. As long as
+/// k < kWindow , the condition has f_0 in place of f_(k - kWindow) .
 constexpr double kRough = 2e-3;
 constexpr int kRoughWindow = 5;
 

@@ -24,7 +24,8 @@ enum class Warmth {
 /// the line search would backtrack.
 ///
 /// If some p_i < 2, the method runs in stages (continuation): p goes from 2 towards p_i, then cell energies are
-/// smoothed by eps, which is decreased until its effect is negligible: at most the tolerance, but 0.03 to 1 % of E. At the start of each stage the metric is
+/// smoothed by eps, which is decreased until it adds little to E: at most the tolerance as a share of E, or 0.03 % where the
+/// tolerance is smaller, or 1 % where it is larger. At the start of each stage the metric is
 /// refactored with the current cell weights, and the memory is cleared. The metric is also refactored every 40th
 /// iteration, and after a shortened step, which shows that the weights have changed. The memory then keeps the last pair,
 /// in the new metric; without it, p > 2 and shallow valleys take two to three times as many iterations. If no weight has
