@@ -111,7 +111,8 @@ class Deformer {
   bool has_other_starts() const;
   /// Whether the current steps are those of such a search.
   bool is_searching() const;
-  /// The true energy of the lowest minimum that start_search has found for the current inputs, if it is below summary().energy.
+  /// The true energy of the lower minimum that start_search has found for the current inputs. It saves at least
+  /// SolveSettings::standing.least_share of summary().energy. Another one replaces it only if that saves as much again.
   std::optional<double> better_energy() const;
   /// Makes that minimum the current state: positions(), cell_energies() and the energies of summary(), which has
   /// no certificate then. False if there is none.

@@ -190,7 +190,10 @@ void Deformer::Impl::end_search() {
   summary.further_starts += search->starts();
   next_start += search->starts();
   for (const double sum : search->minima()) summary.minima.push_back(norm->true_energy(sum));
-  if (search->has_improved() && is_search_apart) better = KnownShape{search->lowest(), search->lowest_sum()};
+  const double known_sum = better ? better->sum : best_sum;
+  const bool is_better = search->lowest_sum() <= (1 - settings.standing.least_share) * known_sum;
+  if (search->has_improved() && is_search_apart && is_better)
+    better = KnownShape{search->lowest(), search->lowest_sum()};
   const bool saves_enough = search->lowest_sum() <= (1 - options.least_saving) * best_sum;
   const bool takes_it = search->has_improved() && !is_search_apart && saves_enough;
   objective.evaluate(takes_it ? search->lowest() : x, *norm);

@@ -60,8 +60,7 @@ void LiveSolver::end_search() {
   const std::optional<double> energy = deformer_->better_energy();
   const std::optional<BetterNote> announced = publisher_.better();
   const double present = deformer_->summary().energy, known = announced ? announced->energy : present;
-  const double least_share = inputs_.solver.standing.least_share;
-  if (!energy || !(present > 0) || *energy > (1 - least_share) * known) return;
+  if (!energy || *energy >= known) return;
   publisher_.metrics().add(Count::kBetterShapes);
   if (inputs_.solver.standing.shows) return show_better();
   publisher_.announce(
