@@ -177,6 +177,10 @@ absl::Status Deformer::start_prepared(const SolveSettings& settings, std::stop_t
   return absl::OkStatus();
 }
 
+bool Deformer::is_guess_smooth() const {
+  return impl_->is_guess_smooth;
+}
+
 bool Deformer::step() {
   Impl& self = *impl_;
   if (self.certificate) return self.certify();

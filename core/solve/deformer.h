@@ -85,6 +85,11 @@ class Deformer {
   /// their targets. settings.initial does not matter.
   absl::Status start_prepared(const SolveSettings& settings, std::stop_token stop = {});
 
+  /// Whether the initial guess of the running or the last solve, which positions() have after start(), can be shown without an
+  /// iteration: E^(1/p) is within a few percent of that after the first one. So it is in a drag of a large mesh where coarse levels
+  /// lead and no p_i is above 2.
+  bool is_guess_smooth() const;
+
   /// Makes one iteration, or one step of a certificate. True while there is more to do; false when the summary is
   /// complete.
   bool step();

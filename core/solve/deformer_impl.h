@@ -169,8 +169,9 @@ struct Deformer::Impl {
     kTogether,  // it is for the same inputs, and has come as far as x
   };
   Lead lead = Lead::kNone;
-  bool goes_alone = false;  // the guess of the running or the last solve is that of guess_alone()
-  int moves_to_lead = 0;    // by the coarse levels, before guess_alone() is tried again
+  bool goes_alone = false;       // the guess of the running or the last solve is that of guess_alone()
+  bool is_guess_smooth = false;  // see Deformer::is_guess_smooth()
+  int moves_to_lead = 0;         // by the coarse levels, before guess_alone() is tried again
   std::unique_ptr<Minimiser> minimiser;
   int fine_iterations = 0;                   // of the running solve
   std::unique_ptr<MinimaSearch> search;      // runs after the minimiser has ended

@@ -53,6 +53,8 @@ bool LiveSolver::run_slice(SolveJob* job, const Pace& pace) {
     phase_ = Phase::kRunning;
     running_for_ = wanted;
     was_begun_ = true;
+    if (job == nullptr && !is_refinement() && deformer_->is_guess_smooth() && is_frame_due(pace))
+      publish(false);
   }
   run_steps(job, pace);
   return phase_ != Phase::kDone;  // after a cancelled solve another job or reader may wait

@@ -68,7 +68,7 @@ class LiveSolver {
   };
 
   /// Runs for about pace.slice, or for one step if that takes longer. The first slice for new inputs is at most
-  /// kFirstSlice, and a slice ends early when newer inputs come. `job` may be null. Returns true if
+  /// kFirstSlice, unless their guess is shown at once, and a slice ends early when newer inputs come. `job` may be null. Returns true if
   /// there is more to do.
   bool run_slice(SolveJob* job, const Pace& pace);
   bool run_slice(SolveJob* job) { return run_slice(job, Pace()); }

@@ -186,7 +186,8 @@ TEST_F(MinimaSearchTest, AShapeThatIsKnownIsReplacedOnlyByOneThatSavesTheLeastSh
     return known;
   };
   const std::vector<double> any = energies(0, 2);
-  EXPECT_LE(any[1], any[0]);  // lower in the last digits, as a later start comes to the same minimum by another way
+  EXPECT_LE(any[1],
+            any[0]);  // lower in the last digits, as a later start comes to the same minimum by another way
   EXPECT_NEAR(any[1], any[0], 1e-4 * any[0]);
   EXPECT_EQ(energies(0.001, 2), std::vector<double>(2, any[0]));
   EXPECT_EQ(energies(0.9, 1), std::vector<double>{0});

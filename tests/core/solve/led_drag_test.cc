@@ -90,6 +90,32 @@ TEST_P(LedDragOfLowPTest, IsSoonNearTheMinimumWhereMovesHaveTime) {
   EXPECT_LE(most, 1.1);
 }
 
+/// So that a frame need not wait for the first iteration, which takes a fifth of the time until then.
+TEST_P(LedDragOfLowPTest, AGuessThatIsSmoothIsNearTheStateAfterAnIteration) {
+  int smooth = 0;
+  double most = 0;
+  for (int number = 1; number <= 12; ++number) {
+    ASSERT_TRUE(live->set_handles(bent(number)).ok());
+    ASSERT_TRUE(live->start({.max_iterations = 1, .effort = 0}).ok());
+    if (!live->is_guess_smooth()) {
+      (void)live->step();
+      continue;
+    }
+    const double shown = live->summary().energy;
+    (void)live->step();
+    most = std::max(most, std::pow(shown / live->summary().energy, 1 / GetParam()));
+    ++smooth;
+  }
+  EXPECT_GT(smooth, 0);
+  EXPECT_LE(most, 1.1);
+}
+
+TEST_P(LedDragOfLowPTest, NoGuessIsSmoothOnceTheHandlesStay) {
+  for (int number = 1; number <= 4; ++number) (void)move(number);
+  ASSERT_TRUE(live->start({.effort = 0}).ok());
+  EXPECT_FALSE(live->is_guess_smooth());
+}
+
 INSTANTIATE_TEST_SUITE_P(LowNorms, LedDragOfLowPTest, testing::Values(1.5, 2.0));
 
 class LedDragAtTwoTest : public LedDragTest {};
