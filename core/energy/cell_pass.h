@@ -40,6 +40,8 @@ class CellPass {
   /// Not for uniform weights, whose cells are in other units than faces.
   void set_bending(const Field& shares);
   void set_bending(double share) { set_bending(Field::Constant(1, share)); }
+  /// Whether all b_i are 1.
+  bool bends_as_cells() const { return !membrane_; }
 
   /// f at x, all rotations fitted.
   double evaluate(const Points& x, const LpNorm& norm);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/methods/kinks.h"
+
 namespace lpdeform {
 namespace {
 
@@ -207,6 +209,7 @@ void Multiresolution::end_coarse() {
   const bool is_better = found.allFinite() && problem_.objective.evaluate(found, problem_.norm) < objective_;
   if (is_better) {
     x_.swap(found);
+    ease_kinks(problem_, x_);
   } else {
     problem_.objective.evaluate(x_, problem_.norm);
   }

@@ -7,6 +7,7 @@
 
 #include "core/constraints/holds.h"
 #include "core/methods/conic.h"
+#include "core/methods/kinks.h"
 #include "core/methods/line_search.h"
 #include "core/methods/local_global.h"
 #include "core/multiresolution/multiresolution.h"
@@ -363,6 +364,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   const double reference = settings.method == Method::kLineSearch ? length_unit() / unit() : typical;
   norm.emplace(effective_material(), shape->vertex_count(), unit(), reference);
   objective.reweigh(*norm);  // typical_energy has evaluated the guess
+  if (is_warm && settings.method == Method::kQuasiNewton) ease_kinks(make_problem(), guess);
   best_sum = std::numeric_limits<double>::infinity();
   minimiser = make_minimiser(settings.method, std::move(guess), warmth);
   // Also before the first step: the next move may come sooner.

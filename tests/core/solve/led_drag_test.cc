@@ -118,6 +118,16 @@ TEST_P(LedDragOfLowPTest, NoGuessIsSmoothOnceTheHandlesStay) {
 
 INSTANTIATE_TEST_SUITE_P(LowNorms, LedDragOfLowPTest, testing::Values(1.5, 2.0));
 
+class LedDragAtSixTest : public LedDragTest {};
+
+/// 3.7 times the minimum, where kinks of the guesses are not eased.
+TEST_P(LedDragAtSixTest, ItsFirstMovesHaveFewKinks) {
+  for (int number = 1; number < 4; ++number) (void)move(number);
+  EXPECT_LE(above_minimum(move(4)), 3.2);
+}
+
+INSTANTIATE_TEST_SUITE_P(AtSix, LedDragAtSixTest, testing::Values(6.0));
+
 class LedDragAtTwoTest : public LedDragTest {};
 
 TEST_P(LedDragAtTwoTest, IsAtTheMinimumWhereMovesHaveTimeForThreeIterations) {
