@@ -12,8 +12,9 @@ namespace {
 constexpr std::size_t kChunk = 512;  // cells
 /// There are kinks if this share of the cells has more than kMuch of the objective.
 constexpr double kFew = 0.001, kMuch = 0.5;
-/// The cells that are eased: this share of all, and this many rings of vertices around them.
-constexpr double kEased = 0.005;
+/// The cells that are eased: this share of all, and this many rings of vertices around them, but no further ring once there are kMost of
+/// all vertices.
+constexpr double kEased = 0.005, kMost = 0.05;
 constexpr int kRings = 3;
 constexpr int kSweeps = 5;
 
@@ -34,7 +35,9 @@ class Patch {
       : problem_(problem), vertices_(std::move(centres)), place_(problem.shape().vertex_count(), -1) {
     for (const std::int32_t i : vertices_) place_[i] = 0;
     std::size_t begin = 0;
-    for (int ring = 0; ring < kRings; ++ring) begin = add_ring(begin);
+    const double most = kMost * problem.shape().cell_count();
+    for (int ring = 0; ring < kRings && static_cast<double>(vertices_.size()) < most; ++ring)
+      begin = add_ring(begin);
     std::ranges::sort(vertices_);
     const std::size_t inner = vertices_.size();
     (void)add_ring(0);  // their rotations count, but they stay
@@ -97,16 +100,16 @@ class Patch {
   }
 
   const Problem& problem_;
-  std::vector<std::int32_t> vertices_;  // those that move, then the ring around them
-  std::vector<std::int32_t> place_;     // of each vertex of the mesh in vertices_; -1 if it is not there
-  std::vector<std::int32_t> moves_;
+  std::vector<std::int32_t> vertices_;      // the patch, then the ring around it
+  std::vector<std::int32_t> place_;         // of each vertex of the mesh in vertices_; -1 if it is not there
+  std::vector<std::int32_t> moves_;         // the free vertices of the patch
   std::vector<Eigen::Matrix3d> rotations_;  // of the cells of vertices_
 };
 
 /// The cells with the largest terms, if few of them have most of the objective; else none.
 std::vector<std::int32_t> kinked_cells(const Problem& problem) {
   const std::vector<double> terms = terms_of(problem);
-  const auto count = static_cast<double>(terms.size());
+  const double count = problem.shape().cell_count();
   const auto few = static_cast<std::ptrdiff_t>(kFew * count);
   const auto eased = static_cast<std::ptrdiff_t>(kEased * count);
   if (few == 0) return {};
@@ -135,10 +138,11 @@ bool ease_kinks(const Problem& problem, Points& x) {
   if (cells.empty()) return false;
   const double before = problem.objective.sum(problem.norm);
   Patch patch(problem, std::move(cells));
+  if (patch.moves().empty()) return false;
   Points rows(static_cast<Eigen::Index>(patch.moves().size()), 3);
   for (Eigen::Index k = 0; k < rows.rows(); ++k)
     rows.row(k) = x.row(patch.moves()[static_cast<std::size_t>(k)]);
-  for (int sweep = 0; sweep < kSweeps; ++sweep) patch.sweep(x);
+  for (int sweep = 0; sweep < kSweeps && !problem.stop.stop_requested(); ++sweep) patch.sweep(x);
   if (problem.objective.evaluate(x, problem.norm) < before) return true;
   for (Eigen::Index k = 0; k < rows.rows(); ++k)
     x.row(patch.moves()[static_cast<std::size_t>(k)]) = rows.row(k);

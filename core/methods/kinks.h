@@ -4,14 +4,15 @@
 
 namespace lpdeform {
 
-/// Eases the kinks of a guess at large p, where a few cells with large E_i outweigh the rest of the surface. If a thousandth of the
-/// cells has more than half of the objective, makes a few sweeps of local/global iterations around the cells of the largest terms: fits
-/// the rotations there, then moves one free vertex after another to where its own edges fit best (Gauss-Seidel on the matrix of
-/// Sorkine & Alexa 2007, Eq. 8, i.e. at p = 2). Keeps the result where it lowers the objective.
+/// Eases the kinks of a guess at large p, where a few cells with large E_i outweigh the rest of the surface. Does nothing unless a
+/// thousandth of the cells has more than half of the objective. Otherwise it makes a few sweeps around the cells of the largest terms. A
+/// sweep fits the rotations there, and then moves one free vertex after another to where its own edges fit best. That is a Gauss-Seidel
+/// iteration for the system of Sorkine & Alexa 2007, Eq. 8, which is for p = 2. The result is kept if it lowers the objective.
 ///
-/// problem.objective holds the evaluation of problem.norm at x, before and afterwards. Does nothing where there are soft or linear
-/// constraints, or where cells do not bend as in Eq. 2 (CellPass::set_bending). True if x has changed. The same bits on any number of
-/// threads. Takes about two evaluations.
+/// problem.objective holds the evaluation of problem.norm at x, before and afterwards. Does nothing on fewer than 1,000 cells, if there are
+/// soft or linear constraints, or if cells do not bend as in Eq. 2 (CellPass::set_bending). True if x has changed. The same bits on any
+/// number of threads. Takes as long as one or two evaluations, and where the largest cells are scattered as long as about eight.
+/// problem.stop ends the sweeps.
 bool ease_kinks(const Problem& problem, Points& x);
 
 }  // namespace lpdeform

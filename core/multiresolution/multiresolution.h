@@ -20,11 +20,11 @@ struct Grading {
 };
 
 /// Solves the coarse level first, by any method that suits it (which may include a level below it), then runs
-/// QuasiNewton from the prolonged result. On large meshes the coarse level is solved as it is, which finds the better
-/// minima, and goes on with cells that bend like those of the fine level (CoarseLevel::bend_like_fine), which saves fine
-/// iterations. If the handles have moved little, there is as a rule one minimum to find. All levels then have such cells from
-/// the beginning; only the lowest is first solved with the bending of the level above it. The long way along a curved valley
-/// is travelled where an iteration costs least.
+/// QuasiNewton from the prolonged result, whose kinks are eased first (kinks.h). On large meshes the coarse level is
+/// solved as it is, which finds the better minima, and goes on with cells that bend like those of the fine level
+/// (CoarseLevel::bend_like_fine), which saves fine iterations. If the handles have moved little, there is as a rule one
+/// minimum to find. All levels then have such cells from the beginning; only the lowest is first solved with the bending
+/// of the level above it. The long way along a curved valley is travelled where an iteration costs least.
 ///
 /// On very large meshes a graded level (graded_level.h) follows after some fine iterations, or before them if some p_i > 2, unless the
 /// handles have moved little. The fine level goes on from its result.

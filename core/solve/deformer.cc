@@ -240,15 +240,21 @@ bool Deformer::is_searching() const {
 }
 
 std::optional<double> Deformer::better_energy() const {
-  if (!impl_->better) return std::nullopt;
-  return impl_->norm->true_energy(impl_->better->sum);
+  const auto better = impl_->better();
+  if (!better) return std::nullopt;
+  return impl_->norm->true_energy(better->sum);
+}
+
+void Deformer::reserve_better() {
+  if (auto better = impl_->better()) impl_->reserved = std::move(better);
 }
 
 bool Deformer::take_better() {
   Impl& self = *impl_;
-  if (!self.better) return false;
+  const auto taken = self.reserved ? self.reserved : self.better();
+  if (!taken) return false;
   self.interrupt();
-  self.take_better();
+  self.take(*taken);
   return true;
 }
 
@@ -299,7 +305,9 @@ std::size_t Deformer::idle_memory_bytes() const {
       impl_->x.size() + impl_->positions.size() + impl_->x_before_move.size() + impl_->best_energies.size();
   const std::size_t held = impl_->constraints ? impl_->constraints->memory_bytes() : 0;
   const std::size_t coarse = impl_->coarse ? impl_->coarse->memory_bytes() : 0;
-  const std::size_t searched = (impl_->better ? points : 0) + (impl_->search ? 3 * points : 0);
+  const std::size_t searched = (impl_->lowest ? points : 0) +
+                               (impl_->reserved && impl_->reserved != impl_->lowest ? points : 0) +
+                               (impl_->search ? 3 * points : 0);
   const std::size_t looked_at = impl_->best_step ? points : 0;
   return sizeof(Impl) + searched + looked_at + held + coarse + impl_->objective.cells().memory_bytes() +
          impl_->metric.memory_bytes() + numbers * sizeof(double) +

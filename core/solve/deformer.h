@@ -85,9 +85,10 @@ class Deformer {
   /// their targets. settings.initial does not matter.
   absl::Status start_prepared(const SolveSettings& settings, std::stop_token stop = {});
 
-  /// Whether the initial guess of the running or the last solve, which positions() have after start(), can be shown without an
-  /// iteration: E^(1/p) is within a few percent of that after the first one. So it is in a drag of a large mesh where coarse levels
-  /// lead and no p_i is above 2.
+  /// Whether the initial guess may be shown before the first iteration. After start(), positions() are that guess. So it is in a drag
+  /// of a large mesh where coarse levels lead, no p_i is above 2 and stiffness is the same everywhere, if the guess at p = 2 has at
+  /// most 1.2 times the E^(1/2) of the state before the move. E^(1/p) is then as a rule within a few percent of that after the first
+  /// iteration.
   bool is_guess_smooth() const;
 
   /// Makes one iteration, or one step of a certificate. True while there is more to do; false when the summary is
@@ -108,7 +109,7 @@ class Deformer {
   /// Begins to look for minima lower than positions(), which must be the result of a solve for the current inputs, from as many
   /// further starts as SolveSettings::effort says. A second call goes on with other starts; on a mesh larger than
   /// DeformerOptions::search_up_to it repeats the one by the coarse levels. step() continues the search. When step() returns
-  /// false, or anything else is started, better_energy() has what was found. positions() do not change. Limits of solves do not
+  /// false, or a certificate or another search is started, better_energy() tells about what was found. positions() do not change. Limits of solves do not
   /// hold. Does nothing where a lower minimum cannot be. INVALID_ARGUMENT (EFFORT_OUT_OF_RANGE); FAILED_PRECONDITION
   /// (NOT_SOLVED). `stop` ends it.
   absl::Status start_search(int effort, std::stop_token stop = {});
@@ -116,11 +117,13 @@ class Deformer {
   bool has_other_starts() const;
   /// Whether the current steps are those of such a search.
   bool is_searching() const;
-  /// The true energy of the lower minimum that start_search has found for the current inputs. It saves at least
-  /// SolveSettings::standing.least_share of summary().energy. Another one replaces it only if that saves as much again.
+  /// The true energy of the lowest minimum that searches have found for the current inputs, if it saves at least the share
+  /// standing.least_share (of the settings of the last start()) of summary().energy, or of the energy of a shape that is reserved.
   std::optional<double> better_energy() const;
-  /// Makes that minimum the current state: positions(), cell_energies() and the energies of summary(), which has
-  /// no certificate then. False if there is none.
+  /// Reserves that minimum: take_better() takes it, whatever a search finds meanwhile. Nothing changes if there is none.
+  void reserve_better();
+  /// Makes the reserved shape, or else the minimum of better_energy(), the current state: positions(), cell_energies() and the
+  /// energies of summary(), which has no certificate then. Ends a search. False if there is none.
   bool take_better();
 
   /// Updates positions(), cell_energies() and summary() to the prolonged state of the coarse level of a running

@@ -196,7 +196,9 @@ Points Deformer::Impl::current_guess() {
   std::optional<Points> led = can_lead ? led_guess() : std::nullopt;
   if (led && is_as_good_as_before(*led)) {
     x_before_move = x;
-    is_guess_smooth = material.p.maxCoeff() <= 2;  // at a larger p kinks of a guess show
+    // At a larger p, kinks of a guess show. Stiffness does not count in what was compared.
+    is_guess_smooth = material.p.maxCoeff() <= 2 && material.stiffness.size() == 1 &&
+                      constraints->footprint.size() == 0 && constraints->linear.empty();
     return go_with(*std::move(led));
   }
   Points guess = continued(forces ? &*forces : nullptr);
@@ -212,7 +214,7 @@ Points Deformer::Impl::current_guess() {
 }
 
 Points Deformer::Impl::initial_guess(InitialGuess guess) {
-  is_guess_evaluated = is_guess_smooth = false;
+  is_guess_evaluated = false;
   Points result;
   if (warmth == Warmth::kPrepared)
     result = x;

@@ -321,8 +321,10 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   stop = std::move(new_stop);
   summary = {};
   summary.threads = workers().threads();
-  better.reset();
+  lowest.reset();
+  reserved.reset();
   next_start = 0;
+  is_guess_smooth = false;
   evaluations_before = objective.evaluations();
   back_substitutions_before = metric.back_substitutions();
   metric_before = metric.version();
@@ -352,7 +354,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   is_guess_evaluated = false;
   Points guess = is_factored ? initial_guess(settings.initial) : constraints->targets;
   if (!guess.allFinite()) {
-    is_guess_evaluated = false;
+    is_guess_evaluated = is_guess_smooth = false;
     guess = constraints->targets;
     constraints->linear.satisfy(guess);
   }
@@ -362,9 +364,16 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   const double typical = typical_energy(guess);
   if (is_guess_good_enough()) settings.method = summary.method = Method::kQuasiNewton;
   const double reference = settings.method == Method::kLineSearch ? length_unit() / unit() : typical;
-  norm.emplace(effective_material(), shape->vertex_count(), unit(), reference);
-  objective.reweigh(*norm);  // typical_energy has evaluated the guess
-  if (is_warm && settings.method == Method::kQuasiNewton) ease_kinks(make_problem(), guess);
+  const auto set_norm = [&](double length) {
+    norm.emplace(effective_material(), shape->vertex_count(), unit(), length);
+    objective.reweigh(*norm);
+  };
+  set_norm(reference);
+  const bool may_have_kinks = is_warm && settings.method == Method::kQuasiNewton && norm->highest_p() > 2;
+  if (may_have_kinks && !is_at_targets(x) && ease_kinks(make_problem(), guess)) {
+    is_guess_evaluated = true;
+    set_norm(typical_energy(guess));
+  }
   best_sum = std::numeric_limits<double>::infinity();
   minimiser = make_minimiser(settings.method, std::move(guess), warmth);
   // Also before the first step: the next move may come sooner.

@@ -93,7 +93,12 @@ struct Deformer::Impl {
   void search_on();
   void end_search();
   void restore_metric();
-  void take_better();
+  struct KnownShape {
+    Points x;
+    double sum;  // true sum
+  };
+  std::shared_ptr<const KnownShape> better() const;
+  void take(const KnownShape& shape);
   void begin_certificate(double max_seconds);
   bool certify();
   void replace_constraints(Constraints next);
@@ -112,7 +117,8 @@ struct Deformer::Impl {
   }
   void change_inputs() {
     interrupt();
-    better.reset();
+    lowest.reset();
+    reserved.reset();
     next_start = 0;
     norm.reset();
   }
@@ -142,11 +148,6 @@ struct Deformer::Impl {
   bool is_positions_current = true;
 
   /// A state for the present inputs.
-  struct KnownShape {
-    Points x;
-    double sum;  // true sum
-  };
-
   enum class Factor {
     kOutdated,  // made for other soft terms or linear rows than the present ones
     kUsable,    // for the present ones, with any cell weights
@@ -175,11 +176,12 @@ struct Deformer::Impl {
   std::unique_ptr<Minimiser> minimiser;
   int fine_iterations = 0;                   // of the running solve
   std::unique_ptr<MinimaSearch> search;      // runs after the minimiser has ended
-  bool is_search_apart = false;              // its result goes to `better`, not to x
+  bool is_search_apart = false;              // its result goes to `lowest`, not to x
   int search_stage = 0;                      // of its records
   int next_start = 0;                        // of the next search for the same inputs
-  std::optional<KnownShape> better;          // the lowest minimum known, if it is lower than x
-  std::unique_ptr<Certificate> certificate;  // runs after the minimiser and the search have ended
+  std::shared_ptr<const KnownShape> lowest;  // minimum that searches apart have found, if it was lower than x
+  std::shared_ptr<const KnownShape> reserved;  // see Deformer::reserve_better()
+  std::unique_ptr<Certificate> certificate;    // runs after the minimiser and the search have ended
   std::chrono::steady_clock::time_point started;
   double best_sum = 0, best_soft_sum = 0;
   std::optional<KnownShape> best_step;  // while x is a better state, which catch_up() has found

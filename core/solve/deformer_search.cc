@@ -166,8 +166,8 @@ void Deformer::Impl::begin_search(int starts) {
   auto finish = [this](Points rough) {
     return std::make_unique<QuasiNewton>(make_problem(), std::move(rough), Warmth::kWithMetric);
   };
-  search = std::make_unique<MinimaSearch>(std::move(start), std::move(finish), scope, better ? better->x : x,
-                                          better ? better->sum : best_sum);
+  search = std::make_unique<MinimaSearch>(std::move(start), std::move(finish), scope, lowest ? lowest->x : x,
+                                          lowest ? lowest->sum : best_sum);
   search_stage = summary.trace.empty() ? 0 : summary.trace.back().stage + 1;
 }
 
@@ -185,15 +185,13 @@ void Deformer::Impl::search_on() {
     conclude();
 }
 
-/// Keeps the lowest minimum found, and leaves the evaluation at x, of which the next solve reads the previous soft targets.
+/// Keeps the lowest minimum found, in `lowest` or as x, and leaves the evaluation at x, of which the next solve reads the previous soft targets.
 void Deformer::Impl::end_search() {
   summary.further_starts += search->starts();
   next_start += search->starts();
   for (const double sum : search->minima()) summary.minima.push_back(norm->true_energy(sum));
-  const double known_sum = better ? better->sum : best_sum;
-  const bool is_better = search->lowest_sum() <= (1 - settings.standing.least_share) * known_sum;
-  if (search->has_improved() && is_search_apart && is_better)
-    better = KnownShape{search->lowest(), search->lowest_sum()};
+  if (search->has_improved() && is_search_apart)
+    lowest = std::make_shared<const KnownShape>(KnownShape{search->lowest(), search->lowest_sum()});
   const bool saves_enough = search->lowest_sum() <= (1 - options.least_saving) * best_sum;
   const bool takes_it = search->has_improved() && !is_search_apart && saves_enough;
   objective.evaluate(takes_it ? search->lowest() : x, *norm);
@@ -214,11 +212,20 @@ void Deformer::Impl::restore_metric() {
   factor = Factor::kQuasiNewton;
 }
 
-void Deformer::Impl::take_better() {
-  forget_weights();  // those of x, from which the better shape differs
-  objective.evaluate(better->x, *norm);
-  keep(better->x, better->sum);
-  better.reset();
+/// The lowest minimum found, if it saves enough of what the reserved shape or else x has; null if not.
+auto Deformer::Impl::better() const -> std::shared_ptr<const KnownShape> {
+  const double known = reserved ? reserved->sum : best_sum;
+  const bool saves_enough =
+      lowest && lowest->sum < known && lowest->sum <= (1 - settings.standing.least_share) * known;
+  return saves_enough ? lowest : nullptr;
+}
+
+void Deformer::Impl::take(const KnownShape& shape) {
+  forget_weights();  // those of x, from which `shape` differs
+  objective.evaluate(shape.x, *norm);
+  keep(shape.x, shape.sum);
+  reserved.reset();
+  if (lowest && lowest->sum >= best_sum) lowest.reset();
   x_before_move.resize(0, 3);
   lead = Lead::kNone;
   summary.energy = norm->true_energy(best_sum);

@@ -58,13 +58,16 @@ bool LiveSolver::postpone_search(Timers::TimePoint until) {
 void LiveSolver::end_search() {
   plan_search();
   const std::optional<double> energy = deformer_->better_energy();
-  const std::optional<BetterNote> announced = publisher_.better();
-  const double present = deformer_->summary().energy, known = announced ? announced->energy : present;
-  if (!energy || *energy >= known) return;
+  if (!energy) return;
+  if (inputs_.solver.standing.shows) {
+    publisher_.metrics().add(Count::kBetterShapes);
+    return show_better();
+  }
+  const double saved_share = 1 - *energy / deformer_->summary().energy;
+  if (!publisher_.announce({.input_seq = inputs_.input_seq, .energy = *energy, .saved_share = saved_share}))
+    return;
   publisher_.metrics().add(Count::kBetterShapes);
-  if (inputs_.solver.standing.shows) return show_better();
-  publisher_.announce(
-      {.input_seq = inputs_.input_seq, .energy = *energy, .saved_share = 1 - *energy / present});
+  deformer_->reserve_better();  // even if a writer has taken it by now, it is shown after this
 }
 
 /// Called before the deformer loses the better shape, and when a writer has taken it. The writer was told that it is

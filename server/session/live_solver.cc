@@ -53,8 +53,7 @@ bool LiveSolver::run_slice(SolveJob* job, const Pace& pace) {
     phase_ = Phase::kRunning;
     running_for_ = wanted;
     was_begun_ = true;
-    if (job == nullptr && !is_refinement() && deformer_->is_guess_smooth() && is_frame_due(pace))
-      publish(false);
+    if (job == nullptr && is_guess_due(pace)) publish(false);
   }
   run_steps(job, pace);
   return phase_ != Phase::kDone;  // after a cancelled solve another job or reader may wait
@@ -150,6 +149,11 @@ bool LiveSolver::is_frame_due(const Pace& pace) const {
     return false;
   if (publisher_.is_frame_wanted(inputs_.taken)) return true;
   return publisher_.reader_count() > 0 && Clock::now() - last_published_ >= kOldestWaiting;
+}
+
+/// Whether the guess is shown before the first step. The frame after that step would be a refinement.
+bool LiveSolver::is_guess_due(const Pace& pace) const {
+  return deformer_->is_guess_smooth() && !is_refinement() && !pace.is_sparing && is_frame_due(pace);
 }
 
 void LiveSolver::end_solve(SolveJob* job) {

@@ -27,7 +27,7 @@ namespace lpdeform {
 /// with the bound found so far. A newer input or a Solve call ends the search.
 ///
 /// Solves for readers take the first minimum. If a result has stood for kSearchQuiet, the solver looks for lower
-/// minima (Deformer::start_search) while nobody waits for an answer, and announces or shows the lowest one. It
+/// minima (Deformer::start_search) while nobody waits for an answer, and announces or shows the lowest one, if it saves enough. It
 /// goes on with further starts, with ever longer pauses, until it has made kMostStarts for these inputs.
 /// Once a writer has taken the announced shape (Publisher::take_better), all that follows goes on from it.
 class LiveSolver {
@@ -68,7 +68,8 @@ class LiveSolver {
   };
 
   /// Runs for about pace.slice, or for one step if that takes longer. The first slice for new inputs is at most
-  /// kFirstSlice, unless their guess is shown at once, and a slice ends early when newer inputs come. `job` may be null. Returns true if
+  /// kFirstSlice, and a slice ends early when newer inputs come. A guess that is smooth (Deformer::is_guess_smooth) is shown before the
+  /// first step, but not under overload, when the frame after that step would come too late. `job` may be null. Returns true if
   /// there is more to do.
   bool run_slice(SolveJob* job, const Pace& pace);
   bool run_slice(SolveJob* job) { return run_slice(job, Pace()); }
@@ -114,6 +115,7 @@ class LiveSolver {
   bool is_refinement() const { return shown_version_ == inputs_.version; }
   bool is_outdated() const { return mailbox_.version() != inputs_.version; }
   bool is_frame_due(const Pace& pace) const;
+  bool is_guess_due(const Pace& pace) const;
   std::shared_ptr<const Frame> publish(bool is_final);
 
   const std::unique_ptr<Deformer> deformer_;

@@ -68,14 +68,15 @@ void Publisher::set_standing(std::optional<FaultNote> fault) {
   wake_all();
 }
 
-void Publisher::announce(BetterNote better) {
+bool Publisher::announce(BetterNote better) {
   {
     const std::scoped_lock lock(mutex_);
-    if (is_better_taken_) return;  // the lowest one is about to be shown
+    if (is_better_taken_) return false;
     better.number = ++better_shapes_;
     better_ = better;
   }
   wake_all();
+  return true;
 }
 
 bool Publisher::forget_better() {

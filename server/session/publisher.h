@@ -44,7 +44,8 @@ class Publisher {
   void set_standing(std::optional<FaultNote> fault);
 
   /// Announces a better shape to every reader, also to those that come later, until forget_better(). Gives it its number.
-  void announce(BetterNote better);
+  /// False, and does nothing, if a writer has taken the shape announced before, which then has to be shown first.
+  bool announce(BetterNote better);
   std::optional<BetterNote> better() const;
   /// Takes what is announced, if it is for this input. The solver must then make it the session's state, whatever comes next.
   /// It learns of it by is_better_taken(), and by forget_better(), after which nothing can be taken.

@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <numeric>
+#include <vector>
 
 #include "core/constraints/constraints.h"
 #include "tests/core/poses.h"
@@ -14,7 +18,7 @@ namespace {
 /// A sheet at p = 6 that is bent smoothly, with a few vertices pushed off it.
 class KinksTest : public testing::Test {
  protected:
-  static constexpr int kSide = 60;  // 3,721 vertices
+  static constexpr int kSide = 160;  // 25,921 vertices
 
   explicit KinksTest(double p = 6) : norm(Material::uniform(p), shape->vertex_count(), 1, 1) {
     for (Eigen::Index i = 0; i < smooth.rows(); ++i) {
@@ -23,13 +27,20 @@ class KinksTest : public testing::Test {
       smooth(i, 0) *= std::cos(angle);
     }
     kinked = smooth;
-    for (const int i : {800, 1500, 2222}) kinked(i, 2) += 0.5;
+    for (const double x : {1, 50, 100}) kinked(at(x, 80), 2) += 0.5;
   }
 
   Problem problem(int threads = 1) {
     objective.emplace(shape, Workers(threads));
     const double infinity = std::numeric_limits<double>::infinity();
     return {*objective, metric, constraints, norm, 1e-4, 1, shape->diagonal(), -infinity, -infinity, {}};
+  }
+  /// The vertex at a place of the flat sheet.
+  std::int32_t at(double x, double y) const {
+    Eigen::Index found = 0;
+    const Eigen::RowVector2d place(x, y);
+    (shape->positions().leftCols(2).rowwise() - place).rowwise().squaredNorm().minCoeff(&found);
+    return static_cast<std::int32_t>(found);
   }
   double energy(const Points& x) { return Objective(shape, Workers(1)).evaluate(x, norm); }
 
@@ -59,9 +70,9 @@ TEST_F(KinksTest, AFewVerticesOffTheSurfaceGoBack) {
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     if (x.row(i) == kinked.row(i)) continue;
     ++moved;
-    EXPECT_EQ(constraints.is_held[i], 0);
+    EXPECT_EQ(constraints.is_held[i], 0);  // one kink is beside held vertices
   }
-  EXPECT_LT(moved, 1000);  // the rest stays
+  EXPECT_LT(moved, 3000);  // the rest stays
 }
 
 TEST_F(KinksTest, ASmoothSurfaceStays) {
@@ -73,8 +84,7 @@ TEST_F(KinksTest, ASmoothSurfaceStays) {
   EXPECT_EQ(objective->sum(norm), before);
 }
 
-/// A spike that held vertices make.
-TEST_F(KinksTest, WhatDoesNotLowerTheEnergyIsTakenBack) {
+TEST_F(KinksTest, HeldVerticesStay) {
   for (Eigen::Index i = 0; i < kinked.rows(); ++i) constraints.is_held[i] = 1;
   Problem made = problem();
   const double before = objective->evaluate(kinked, norm);
@@ -84,7 +94,31 @@ TEST_F(KinksTest, WhatDoesNotLowerTheEnergyIsTakenBack) {
   EXPECT_EQ(objective->sum(norm), before);
 }
 
+/// A vertex is held off the sheet, in the minimum at p = 3. Sweeps go towards that at p = 2, where the energy at p = 6 is higher.
+TEST_F(KinksTest, WhatDoesNotLowerTheEnergyIsTakenBack) {
+  const std::int32_t spike = at(80, 80);
+  (void)handles.set("spike", {{spike}, turn(Eigen::Vector3d::UnitZ(), 0, {0, 0, 0}, {0, 0, 2})});
+  constraints = make_constraints(*shape, handles, FreeComponents::kError).value();
+  const auto solver = deformer(shape, handles, Material::uniform(3));
+  (void)solver->solve({.effort = 0});
+  Points spiked = (solver->positions().rowwise() - shape->centre()) / shape->mean_edge_length();
+  for (const std::int32_t i : constraints.exact.vertices) spiked.row(i) = constraints.targets.row(i);
+  Problem made = problem();
+  const double before = objective->evaluate(spiked, norm);
+  const std::vector<double>& squares = objective->cells().squared_energies();
+  std::vector<double> terms(squares.size());
+  std::ranges::transform(squares, terms.begin(), [](double e2) { return e2 * e2 * e2; });
+  std::ranges::sort(terms, std::greater<>());
+  const double few = std::accumulate(terms.begin(), terms.begin() + 25, 0.0);
+  ASSERT_GT(few, 0.5 * std::accumulate(terms.begin(), terms.end(), 0.0));  // as a kink has it
+  Points x = spiked;
+  EXPECT_FALSE(ease_kinks(made, x));
+  EXPECT_EQ(x, spiked);
+  EXPECT_EQ(objective->sum(norm), before);
+}
+
 TEST_F(KinksTest, GivesTheSameBitsOnAnyNumberOfThreads) {
+  for (int k = 1; k < 16; ++k) kinked(at(10 * k, 40), 2) += 0.2;  // so that the patch has several chunks
   Points one = kinked, two = kinked;
   Problem made = problem(1);
   objective->evaluate(one, norm);
@@ -93,6 +127,7 @@ TEST_F(KinksTest, GivesTheSameBitsOnAnyNumberOfThreads) {
   objective->evaluate(two, norm);
   EXPECT_TRUE(ease_kinks(other, two));
   EXPECT_EQ(one, two);
+  EXPECT_NE(one.row(at(80, 40)), kinked.row(at(80, 40)));
 }
 
 class KinksAtTwoTest : public KinksTest {

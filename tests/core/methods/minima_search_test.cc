@@ -50,6 +50,16 @@ class MinimaSearchTest : public testing::Test {
   static SolveSummary solve(const Bent& bent, const SolveSettings& settings) {
     return solver_of(bent)->solve(settings).value();
   }
+  /// A bar after a solve with this least share and one search.
+  static std::unique_ptr<Deformer> searched(double least_share) {
+    auto solver = solver_of(bar(80));
+    SolveSettings settings = cold(0);
+    settings.standing.least_share = least_share;
+    (void)solver->solve(settings).value();
+    EXPECT_TRUE(solver->start_search(1).ok());
+    run(*solver);
+    return solver;
+  }
   static void run(Deformer& deformer) {
     while (deformer.step()) {
     }
@@ -171,26 +181,40 @@ TEST_F(MinimaSearchTest, ASecondSearchGoesOnWithOtherStarts) {
   EXPECT_GE(solver->summary().minima.size(), after_one.size());
 }
 
-TEST_F(MinimaSearchTest, AShapeThatIsKnownIsReplacedOnlyByOneThatSavesTheLeastShareMore) {
-  const auto energies = [](double least_share, int searches) {
-    const auto solver = solver_of(bar(80));
-    SolveSettings settings = cold(0);
-    settings.standing.least_share = least_share;
-    (void)solver->solve(settings).value();
-    std::vector<double> known;
-    for (int search = 0; search < searches; ++search) {
-      EXPECT_TRUE(solver->start_search(1).ok());
-      run(*solver);
-      known.push_back(solver->better_energy().value_or(0));
-    }
-    return known;
-  };
-  const std::vector<double> any = energies(0, 2);
-  EXPECT_LE(any[1],
-            any[0]);  // lower in the last digits, as a later start comes to the same minimum by another way
-  EXPECT_NEAR(any[1], any[0], 1e-4 * any[0]);
-  EXPECT_EQ(energies(0.001, 2), std::vector<double>(2, any[0]));
-  EXPECT_EQ(energies(0.9, 1), std::vector<double>{0});
+TEST_F(MinimaSearchTest, AShapeThatIsReservedIsTakenWhateverIsFoundLater) {
+  const auto solver = searched(0);
+  const double first = solver->better_energy().value_or(0);
+  ASSERT_GT(first, 0);
+  solver->reserve_better();
+  EXPECT_FALSE(solver->better_energy().has_value());
+  ASSERT_TRUE(solver->start_search(1).ok());
+  run(*solver);
+  // A later start comes to the same minimum by another way, and is lower in the last digits.
+  EXPECT_NEAR(solver->better_energy().value_or(first), first, 1e-4 * first);
+  ASSERT_TRUE(solver->start_search(1).ok());
+  ASSERT_TRUE(solver->take_better());  // which ends that search
+  EXPECT_FALSE(solver->is_searching());
+  EXPECT_EQ(solver->summary().energy, first);
+}
+
+TEST_F(MinimaSearchTest, AMinimumThatSavesTooLittleIsNotBetterButTheNextSearchGoesOnFromIt) {
+  const auto solver = searched(0.9);
+  EXPECT_FALSE(solver->better_energy().has_value());
+  EXPECT_FALSE(solver->take_better());
+  const auto other = searched(0);
+  for (Deformer* const one : {solver.get(), other.get()}) {
+    ASSERT_TRUE(one->start_search(1).ok());
+    run(*one);
+  }
+  EXPECT_EQ(solver->summary().minima, other->summary().minima);
+}
+
+TEST_F(MinimaSearchTest, OnceAShapeIsReservedAnotherIsBetterOnlyIfItSavesTheLeastShareMore) {
+  const auto solver = searched(0.001);
+  solver->reserve_better();
+  ASSERT_TRUE(solver->start_search(1).ok());
+  run(*solver);
+  EXPECT_FALSE(solver->better_energy().has_value());
 }
 
 TEST_F(MinimaSearchTest, NewInputsForgetWhatWasFound) {
@@ -235,7 +259,9 @@ TEST_F(MinimaSearchTest, ThereIsOneMinimiserAtATime) {
 TEST_F(MinimaSearchTest, AMoveAfterASearchThatFoundNothingIsAsWithoutOne) {
   const auto move = [](bool searches, int most_iterations) {
     const auto solver = solver_of(lifted_grid(5));
-    (void)solver->solve(cold(0)).value();
+    SolveSettings settings = cold(0);
+    settings.standing.least_share = 0;
+    (void)solver->solve(settings).value();
     const absl::Status status = searches ? solver->start_search(1) : absl::OkStatus();
     EXPECT_TRUE(status.ok());
     run(*solver);

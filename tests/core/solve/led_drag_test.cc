@@ -111,7 +111,10 @@ TEST_P(LedDragOfLowPTest, AGuessThatIsSmoothIsNearTheStateAfterAnIteration) {
 }
 
 TEST_P(LedDragOfLowPTest, NoGuessIsSmoothOnceTheHandlesStay) {
-  for (int number = 1; number <= 4; ++number) (void)move(number);
+  for (int number = 1; number <= 12; ++number) (void)move(number);
+  if (GetParam() == 1.5) {
+    EXPECT_TRUE(live->is_guess_smooth());
+  }
   ASSERT_TRUE(live->start({.effort = 0}).ok());
   EXPECT_FALSE(live->is_guess_smooth());
 }
@@ -122,7 +125,10 @@ class LedDragAtSixTest : public LedDragTest {};
 
 /// 3.7 times the minimum, where kinks of the guesses are not eased.
 TEST_P(LedDragAtSixTest, ItsFirstMovesHaveFewKinks) {
-  for (int number = 1; number < 4; ++number) (void)move(number);
+  for (int number = 1; number < 4; ++number) {
+    (void)move(number);
+    EXPECT_FALSE(live->is_guess_smooth());
+  }
   EXPECT_LE(above_minimum(move(4)), 3.2);
 }
 

@@ -109,6 +109,35 @@ TEST_F(LiveSearchTest, ALateUpdateDoesNotLoseATakenShape) {
   EXPECT_NEAR(publisher_->newest()->energy, better->energy, 1e-3 * better->energy);
 }
 
+/// A later start comes to the same minimum by another way, and is lower in the last digits.
+TEST_F(LiveSearchTest, TheShapeThatWasAnnouncedIsShownWhateverALaterSearchFinds) {
+  const auto stream = look_on();
+  (void)search(bend(1));
+  const auto better = announced(*stream);
+  ASSERT_TRUE(better.has_value());
+  EXPECT_GT(wait_for_search(), 0);
+  EXPECT_FALSE(announced(*stream).has_value());
+  ASSERT_TRUE(take());
+  solver_.run_slice(nullptr);
+  EXPECT_EQ(publisher_->newest()->energy, better->energy);
+}
+
+TEST_F(LiveSearchTest, TheShapeThatWasAnnouncedIsShownAlsoDuringALaterSearch) {
+  const auto stream = look_on();
+  (void)search(bend(1));
+  const auto better = announced(*stream);
+  ASSERT_TRUE(better.has_value());
+  for (int waited = 0; waited < 300 && !solver_.is_searching(); ++waited) {
+    timers_->advance(LiveSolver::kSearchQuiet);
+    solver_.run_slice(nullptr);
+  }
+  for (int slice = 0; slice < 5; ++slice) solver_.run_slice(nullptr);
+  ASSERT_TRUE(solver_.is_searching());
+  ASSERT_TRUE(take());
+  solver_.run_slice(nullptr);
+  EXPECT_EQ(publisher_->newest()->energy, better->energy);
+}
+
 TEST_F(LiveSearchTest, ARefusedSolveLeavesWhatIsAnnounced) {
   const auto stream = look_on();
   search(bend(1));

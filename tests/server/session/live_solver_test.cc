@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <atomic>
 #include <limits>
+#include <numbers>
 #include <thread>
+#include <utility>
+#include <vector>
 
+#include "core/shapes/shapes.h"
 #include "live_solver_fixture.h"
 
 namespace lpdeform {
@@ -289,6 +293,65 @@ TEST_F(LiveSolverTest, AHastyDragBackToTheStartEndsAtRest) {
     EXPECT_TRUE(publisher_->newest()->is_final);
     EXPECT_LE(publisher_->newest()->energy, 1e-6 * largest) << "p = " << p;
   }
+}
+
+/// A sheet so large that coarse levels lead its drags. Its right edge turns by three degrees with each move.
+class LargeSheetTest : public LiveSolverTest {
+ protected:
+  static constexpr int kSide = 174;  // 30,625 vertices
+  LargeSheetTest() : LiveSolverTest(grid(kSide, kSide, 2)) {}
+
+  /// Makes 20 moves, with two slices each. The numbers of moves that were shown once and twice in the first one.
+  std::pair<int, int> drag(double p, const LiveSolver::Pace& pace) {
+    const auto stream = look_on();
+    int once = 0, twice = 0;
+    for (std::uint64_t number = 1; number <= 20; ++number) {
+      Update update;
+      update.input_seq = number;
+      update.handles.push_back({"left", Handle{slice(0), Fixed{}}});
+      const RigidMotion turn{Eigen::Vector3d::UnitY(),
+                             -std::numbers::pi / 60 * static_cast<double>(number),
+                             {0.5 * kSide, 0, 0},
+                             {0, 0, 0}};
+      update.handles.push_back({"right", Handle{slice(kSide), turn}});
+      if (number == 1) update.settings.p = Field::Constant(1, p);
+      EXPECT_TRUE(mailbox_.take(update).ok());
+      const std::uint64_t before = publisher_->newest()->frame_seq;
+      (void)solver_.run_slice(nullptr, pace);
+      const auto frame = publisher_->newest();
+      EXPECT_EQ(frame->input_seq, number);
+      EXPECT_GE(frame->iteration, 1u);
+      ++(frame->frame_seq == before + 1 ? once : twice);
+      (void)solver_.run_slice(nullptr, pace);
+      while (stream->next()) {
+      }
+      EXPECT_TRUE(stream->acknowledge(publisher_->newest()->frame_seq).ok());
+    }
+    return {once, twice};
+  }
+
+ private:
+  std::vector<std::int32_t> slice(double x) const {
+    std::vector<std::int32_t> found;
+    for (Eigen::Index i = 0; i < rest().rows(); ++i) {
+      if (rest()(i, 0) == x) found.push_back(static_cast<std::int32_t>(i));
+    }
+    return found;
+  }
+};
+
+TEST_F(LargeSheetTest, AMoveThatCoarseLevelsLeadIsShownBeforeItsFirstIteration) {
+  const auto [once, twice] = drag(1.5, {});
+  EXPECT_GT(twice, 2);
+  EXPECT_GT(once, 0);  // the first move
+}
+
+TEST_F(LargeSheetTest, UnderOverloadEachMoveIsShownAfterAnIteration) {
+  EXPECT_EQ(drag(1.5, {.slice = LiveSolver::kShortSlice, .is_sparing = true}).second, 0);
+}
+
+TEST_F(LargeSheetTest, AtALargePEachMoveIsShownAfterAnIteration) {
+  EXPECT_EQ(drag(6, {}).second, 0);
 }
 
 class TwoBarsTest : public LiveSolverTest {
