@@ -109,9 +109,9 @@ class Deformer {
   /// Begins to look for minima lower than positions(), which must be the result of a solve for the current inputs, from as many
   /// further starts as SolveSettings::effort says. A second call goes on with other starts; on a mesh larger than
   /// DeformerOptions::search_up_to it repeats the one by the coarse levels. step() continues the search. When step() returns
-  /// false, or a certificate or another search is started, better_energy() tells about what was found. positions() do not change. Limits of solves do not
-  /// hold. Does nothing where a lower minimum cannot be. INVALID_ARGUMENT (EFFORT_OUT_OF_RANGE); FAILED_PRECONDITION
-  /// (NOT_SOLVED). `stop` ends it.
+  /// false, or a certificate or another search is started, better_energy() tells about what was found. positions() do not
+  /// change. Limits of solves do not hold. Does nothing where a lower minimum cannot be. INVALID_ARGUMENT (EFFORT_OUT_OF_RANGE);
+  /// FAILED_PRECONDITION (NOT_SOLVED). `stop` ends it.
   absl::Status start_search(int effort, std::stop_token stop = {});
   /// Whether a second call would go on with other starts.
   bool has_other_starts() const;

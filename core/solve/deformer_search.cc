@@ -185,7 +185,8 @@ void Deformer::Impl::search_on() {
     conclude();
 }
 
-/// Keeps the lowest minimum found, in `lowest` or as x, and leaves the evaluation at x, of which the next solve reads the previous soft targets.
+/// Keeps the lowest minimum found, in `lowest` or as x, and leaves the evaluation at x, of which the next solve reads the previous
+/// soft targets.
 void Deformer::Impl::end_search() {
   summary.further_starts += search->starts();
   next_start += search->starts();
