@@ -41,7 +41,7 @@ std::string_view stop_reason_name(StopReason reason);  // "iteration_limit"
 /// What a live session does with a lower minimum that it has found while its result stands.
 struct StandingSearch {
   bool shows = false;  // shows it; otherwise announces it. Not used by Deformer
-  /// The share of the energy that a lower minimum must save to be kept (Deformer::start_search). 0 to 1.
+  /// The share of the energy that a lower minimum must save to be better (Deformer::better_energy). 0 to 1.
   double least_share = 0.02;
 
   bool operator==(const StandingSearch&) const = default;

@@ -93,6 +93,7 @@ struct Deformer::Impl {
   void search_on();
   void end_search();
   void restore_metric();
+  /// A state for the present inputs.
   struct KnownShape {
     Points x;
     double sum;  // true sum
@@ -147,7 +148,6 @@ struct Deformer::Impl {
   Points positions;      // x in the caller's units, made when asked for
   bool is_positions_current = true;
 
-  /// A state for the present inputs.
   enum class Factor {
     kOutdated,  // made for other soft terms or linear rows than the present ones
     kUsable,    // for the present ones, with any cell weights

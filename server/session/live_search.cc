@@ -57,6 +57,11 @@ bool LiveSolver::postpone_search(Timers::TimePoint until) {
 
 void LiveSolver::end_search() {
   plan_search();
+  offer_better();
+}
+
+/// Announces or shows the lowest minimum found, if it saves enough.
+void LiveSolver::offer_better() {
   const std::optional<double> energy = deformer_->better_energy();
   if (!energy) return;
   if (inputs_.solver.standing.shows) {

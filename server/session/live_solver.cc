@@ -35,7 +35,10 @@ bool LiveSolver::run_slice(SolveJob* job, const Pace& pace) {
   const Inputs newest = mailbox_.newest();
   if (job != nullptr && newest.version > job->version) job->finish(superseded(newest.input_seq));
   if (job != nullptr && job->is_done()) job = nullptr;
-  if (publisher_.is_better_taken()) withdraw_better();
+  if (publisher_.is_better_taken()) {
+    withdraw_better();
+    if (newest.version == inputs_.version) offer_better();  // what was found while that one was being taken
+  }
   if (newest.version != inputs_.version) take_over(newest);
 
   const std::uint64_t wanted = job != nullptr                  ? job->number()

@@ -68,8 +68,9 @@ class LiveSolver {
   };
 
   /// Runs for about pace.slice, or for one step if that takes longer. The first slice for new inputs is at most
-  /// kFirstSlice, and a slice ends early when newer inputs come. A guess that is smooth (Deformer::is_guess_smooth) is shown before the
-  /// first step, but not under overload, when the frame after that step would come too late. `job` may be null. Returns true if
+  /// kFirstSlice, unless their guess is shown. A slice ends early when newer inputs come. A guess that is smooth
+  /// (Deformer::is_guess_smooth) is shown before the first step, but not under overload, when the frame after that step would come too
+  /// late. `job` may be null. Returns true if
   /// there is more to do.
   bool run_slice(SolveJob* job, const Pace& pace);
   bool run_slice(SolveJob* job) { return run_slice(job, Pace()); }
@@ -109,6 +110,7 @@ class LiveSolver {
   bool begin_search();
   bool postpone_search(Timers::TimePoint until);
   void end_search();
+  void offer_better();
   void withdraw_better();
   void show_better();
   void report(const SolveJob& job);

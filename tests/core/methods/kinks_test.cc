@@ -84,6 +84,17 @@ TEST_F(KinksTest, ASmoothSurfaceStays) {
   EXPECT_EQ(objective->sum(norm), before);
 }
 
+TEST_F(KinksTest, WhereKinksAreScatteredFewerRingsAreEased) {
+  for (int k = 0; k < 150; ++k) kinked(at(5 + 10 * (k % 15), 5 + 15 * (k / 15)), 2) += 0.2;
+  Problem made = problem();
+  objective->evaluate(kinked, norm);
+  Points x = kinked;
+  EXPECT_TRUE(ease_kinks(made, x));
+  const auto moved = (x - kinked).rowwise().any().count();
+  EXPECT_GT(moved, 500);
+  EXPECT_LT(static_cast<double>(moved), 0.15 * static_cast<double>(x.rows()));
+}
+
 TEST_F(KinksTest, HeldVerticesStay) {
   for (Eigen::Index i = 0; i < kinked.rows(); ++i) constraints.is_held[i] = 1;
   Problem made = problem();
