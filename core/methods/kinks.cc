@@ -1,6 +1,7 @@
 #include "core/methods/kinks.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <vector>
 
@@ -106,20 +107,19 @@ class Patch {
   std::vector<Eigen::Matrix3d> rotations_;  // of the cells of vertices_
 };
 
-/// The cells with the largest terms, if few of them have most of the objective; else none.
-std::vector<std::int32_t> kinked_cells(const Problem& problem) {
-  const std::vector<double> terms = terms_of(problem);
+/// The cells with the largest terms, if few of them have most of their sum `all`; else none.
+std::vector<std::int32_t> kinked_cells(const Problem& problem, double all) {
   const double count = problem.shape().cell_count();
   const auto few = static_cast<std::ptrdiff_t>(kFew * count);
   const auto eased = static_cast<std::ptrdiff_t>(kEased * count);
   if (few == 0) return {};
+  const std::vector<double> terms = terms_of(problem);
   std::vector<double> largest = terms;
   std::nth_element(largest.begin(), largest.begin() + eased, largest.end(), std::greater<>());
   const double least = largest[static_cast<std::size_t>(eased)];
   std::nth_element(largest.begin(), largest.begin() + few, largest.begin() + eased, std::greater<>());
-  double of_few = 0, all = 0;
+  double of_few = 0;
   for (std::ptrdiff_t k = 0; k < few; ++k) of_few += largest[static_cast<std::size_t>(k)];
-  for (const double term : terms) all += term;
   if (!(of_few > kMuch * all)) return {};
   std::vector<std::int32_t> cells;
   for (std::size_t i = 0; i < terms.size(); ++i) {
@@ -134,9 +134,10 @@ bool ease_kinks(const Problem& problem, Points& x) {
   const bool can_ease = problem.norm.highest_p() > 2 && problem.constraints.soft.empty() &&
                         problem.constraints.linear.empty() && problem.objective.cells().bends_as_cells();
   if (!can_ease) return false;
-  std::vector<std::int32_t> cells = kinked_cells(problem);
-  if (cells.empty()) return false;
   const double before = problem.objective.sum(problem.norm);
+  if (!std::isfinite(before)) return false;
+  std::vector<std::int32_t> cells = kinked_cells(problem, before);
+  if (cells.empty()) return false;
   Patch patch(problem, std::move(cells));
   if (patch.moves().empty()) return false;
   Points rows(static_cast<Eigen::Index>(patch.moves().size()), 3);
