@@ -10,7 +10,7 @@ namespace lpdeform {
 
 /// A level between a coarse level and the fine one: all vertices of the fine mesh where the distortion is, and a sixth of them
 /// elsewhere. Most of what the fine level has left to do after a coarse level happens where the distortion is, which is a small part of
-/// the surface (tests/bench/README.md). The rest has to move along, mostly rigidly. Each cell resists bending as the
+/// the surface (tests/bench/tried.md). The rest has to move along, mostly rigidly. Each cell resists bending as the
 /// fine cells that it stands for (CellPass::set_bending). One caller at a time.
 class GradedLevel {
  public:

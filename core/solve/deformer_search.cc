@@ -17,7 +17,7 @@ constexpr std::int32_t kSmallestMesh = 100;  // vertices; smaller ones have few 
 constexpr double kWork = 2e7;                // iterations times vertices of a start, at most
 
 /// Start k begins at the Laplacian deformation or at the lowest minimum, displaced by a share of the diagonal: at kOrigins[k mod
-/// 4]. No single one of them reaches the lowest minimum of every problem (tests/bench/README.md, "Minima").
+/// 4]. No single one of them reaches the lowest minimum of every problem (tests/bench/tried.md, "Minima").
 struct Origin {
   bool is_lowest;
   double share;

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "server/server.h"
-#ifdef LPDEFORM_DEPLOY_WEB
+#ifdef LPDEFORM_OVER_WEB
 #include "tests/client/web_front.h"
 #endif
 
@@ -20,7 +20,7 @@ namespace lpdeform::client {
 /// gRPC-Web, it has a port instead, and clients reach it through the project's Envoy.
 class InProcessServer {
  public:
-#ifdef LPDEFORM_DEPLOY_WEB
+#ifdef LPDEFORM_OVER_WEB
   explicit InProcessServer(Transport transport = Transport::kPlain)
       : InProcessServer(ServerOptions(), transport) {}
 
@@ -72,7 +72,7 @@ class InProcessServer {
 
  private:
   ServerOptions options_;
-#ifdef LPDEFORM_DEPLOY_WEB
+#ifdef LPDEFORM_OVER_WEB
   std::string listening() const {
     return front_ ? front_->server() : "127.0.0.1:0";
   }

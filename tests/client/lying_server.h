@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "lpdeform/v1/service.grpc.pb.h"
-#ifdef LPDEFORM_DEPLOY_WEB
+#ifdef LPDEFORM_OVER_WEB
 #include <grpcpp/ext/health_check_service_server_builder_option.h>
 
 #include "tests/client/web_front.h"
@@ -131,7 +131,7 @@ class LyingService final : public v1::DeformService::Service {
 class LyingServer {
  public:
   explicit LyingServer(const Lies& lies) : service_(lies) {
-#ifdef LPDEFORM_DEPLOY_WEB
+#ifdef LPDEFORM_OVER_WEB
     grpc::EnableDefaultHealthCheckService(true);  // Envoy asks for it
 #endif
     grpc::ServerBuilder builder;
@@ -140,7 +140,7 @@ class LyingServer {
     builder.RegisterService(&service_);
     server_ = builder.BuildAndStart();
     address_ = "127.0.0.1:" + std::to_string(port);
-#ifdef LPDEFORM_DEPLOY_WEB
+#ifdef LPDEFORM_OVER_WEB
     server_->GetHealthCheckService()->SetServingStatus(v1::DeformService::service_full_name(), true);
     front_ = std::make_unique<WebFront>(address_);
     front_->wait_for_server();
@@ -175,7 +175,7 @@ class LyingServer {
   LyingService service_;
   std::unique_ptr<grpc::Server> server_;
   std::string address_;
-#ifdef LPDEFORM_DEPLOY_WEB
+#ifdef LPDEFORM_OVER_WEB
   std::unique_ptr<WebFront> front_;
 #endif
 };

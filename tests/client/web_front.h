@@ -22,6 +22,9 @@
 
 namespace lpdeform::client {
 
+/// The path of deploy/web.
+extern const char* const kWebProgram;
+
 /// Whether Envoy has TLS.
 enum class Transport { kPlain, kTls };
 
@@ -48,7 +51,7 @@ class WebFront {
     process_ = fork();
     if (process_ == 0) {
       prctl(PR_SET_PDEATHSIG, SIGTERM);
-      execv(LPDEFORM_DEPLOY_WEB, words.data());
+      execv(kWebProgram, words.data());
       _exit(127);
     }
     find(admin);

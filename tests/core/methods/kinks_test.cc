@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <numeric>
+#include <stop_token>
 #include <vector>
 
 #include "core/constraints/constraints.h"
@@ -33,7 +34,7 @@ class KinksTest : public testing::Test {
   Problem problem(int threads = 1) {
     objective.emplace(shape, Workers(threads));
     const double infinity = std::numeric_limits<double>::infinity();
-    return {*objective, metric, constraints, norm, 1e-4, 1, shape->diagonal(), -infinity, -infinity, {}};
+    return {*objective, metric, constraints, norm, 1e-4, 1, shape->diagonal(), -infinity, -infinity, stop};
   }
   /// Nothing is to be eased at `state`.
   void expect_stays(const Points& state) {
@@ -63,6 +64,7 @@ class KinksTest : public testing::Test {
   Metric metric = Metric::create(shape).value();
   std::optional<Objective> objective;
   LpNorm norm;
+  std::stop_token stop;
   Points smooth = shape->scaled_positions(), kinked;
 };
 
@@ -90,6 +92,13 @@ TEST_F(KinksTest, ASmoothSurfaceStays) {
 
 TEST_F(KinksTest, AnOverflownEnergyIsLeftAlone) {
   expect_stays(1e80 * kinked);
+}
+
+TEST_F(KinksTest, WhoStopsBeforeTheFirstSweepGetsTheStateBack) {
+  std::stop_source source;
+  source.request_stop();
+  stop = source.get_token();
+  expect_stays(kinked);
 }
 
 TEST_F(KinksTest, WhereKinksAreScatteredFewerRingsAreEased) {
