@@ -1,7 +1,6 @@
 #include "core/methods/kinks.h"
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <vector>
 
@@ -135,7 +134,6 @@ bool ease_kinks(const Problem& problem, Points& x) {
                         problem.constraints.linear.empty() && problem.objective.cells().bends_as_cells();
   if (!can_ease) return false;
   const double before = problem.objective.sum(problem.norm);
-  if (!std::isfinite(before)) return false;
   std::vector<std::int32_t> cells = kinked_cells(problem, before);
   if (cells.empty()) return false;
   Patch patch(problem, std::move(cells));

@@ -5,7 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "core/constraints/holds.h"
 #include "core/methods/conic.h"
 #include "core/methods/kinks.h"
 #include "core/methods/line_search.h"

@@ -16,8 +16,8 @@
 
 namespace lpdeform {
 
-/// The state of a Deformer, and the loop of a solve. Initial guesses are in deformer_guess.cc, the search for lower minima in
-/// deformer_search.cc, everything else in deformer_impl.cc.
+/// The state of a Deformer, and the loop of a solve. Initial guesses are in deformer_guess.cc, what has to do with coarse levels in
+/// deformer_levels.cc, the search for lower minima in deformer_search.cc, and everything else in deformer_impl.cc.
 struct Deformer::Impl {
   Impl(std::shared_ptr<const RestShape> rest_shape, DeformerOptions deformer_options,
        Objective first_objective, Metric first_metric, std::optional<CoarseMesh> first_coarse_mesh)

@@ -1,8 +1,12 @@
 #include <algorithm>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <stop_token>
 #include <utility>
+#include <vector>
 
+#include "core/multiresolution/level_solver.h"
 #include "core/multiresolution/multiresolution.h"
 #include "core/solve/deformer_impl.h"
 

@@ -20,10 +20,9 @@
 
 #include <httplib.h>
 
-namespace lpdeform::client {
+#include "tests/client/web_program.h"
 
-/// The path of deploy/web.
-extern const char* const kWebProgram;
+namespace lpdeform::client {
 
 /// Whether Envoy has TLS.
 enum class Transport { kPlain, kTls };

@@ -1,3 +1,3 @@
-#include "tests/client/web_front.h"
+#include "tests/client/web_program.h"
 
 const char* const lpdeform::client::kWebProgram = LPDEFORM_WEB_PROGRAM;

@@ -14,6 +14,7 @@ TEST(PublisherTest, NothingElseIsAnnouncedWhileAShapeIsTaken) {
   EXPECT_EQ(publisher.better()->energy, 2);
   EXPECT_EQ(publisher.better()->number, 1u);
   EXPECT_TRUE(publisher.forget_better());  // it was taken
+  EXPECT_FALSE(publisher.better());
 
   EXPECT_TRUE(publisher.announce({.input_seq = 7, .energy = 1}));
   EXPECT_EQ(publisher.better()->energy, 1);

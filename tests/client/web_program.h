@@ -1,0 +1,8 @@
+#pragma once
+
+namespace lpdeform::client {
+
+/// The path of deploy/web.
+extern const char* const kWebProgram;
+
+}  // namespace lpdeform::client
