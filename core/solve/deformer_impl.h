@@ -162,7 +162,6 @@ struct Deformer::Impl {
   std::stop_token stop;
   std::optional<LpNorm> norm;             // true norm, and the reference of the running solve
   std::unique_ptr<CoarseLevel> coarse;    // made when first needed
-  bool is_coarsest = false;               // it could not be made
   std::optional<double> least_of_lowest;  // E of the lowest level; see is_guess_good_enough()
   enum class Lead {
     kNone,   // the coarse level's state has nothing to do with x
@@ -170,11 +169,12 @@ struct Deformer::Impl {
     kTogether,  // it is for the same inputs, and has come as far as x
   };
   Lead lead = Lead::kNone;
+  bool is_coarsest = false;      // the coarse level could not be made
   bool goes_alone = false;       // the guess of the running or the last solve is that of guess_alone()
   bool is_guess_smooth = false;  // see Deformer::is_guess_smooth()
   int moves_to_lead = 0;         // by the coarse levels, before guess_alone() is tried again
+  int fine_iterations = 0;       // of the running solve
   std::unique_ptr<Minimiser> minimiser;
-  int fine_iterations = 0;                   // of the running solve
   std::unique_ptr<MinimaSearch> search;      // runs after the minimiser has ended
   bool is_search_apart = false;              // its result goes to `lowest`, not to x
   int search_stage = 0;                      // of its records
