@@ -78,8 +78,6 @@ Workers::Workers(int threads) : threads_(threads) {
   if (threads > 1) arena_ = std::make_shared<Arena>(threads);
 }
 
-Workers::~Workers() = default;
-
 void Workers::for_chunks(std::size_t count, std::size_t chunk_size,
                          const std::function<void(std::size_t, std::size_t, std::size_t)>& body) const {
   const std::size_t chunks = (count + chunk_size - 1) / chunk_size;

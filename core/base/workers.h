@@ -13,7 +13,6 @@ class Workers {
  public:
   /// At most `threads` >= 1 threads are used, including the calling one; 1 runs everything inline.
   explicit Workers(int threads);
-  ~Workers();
 
   int threads() const { return threads_; }
 

@@ -55,7 +55,7 @@ void SingleCholesky::find_updates() {
   update_work_.assign(count, 0);
   const auto for_updates = [&](const auto& body) {
     for (std::size_t k = 0; k < count; ++k) {
-      const SingleFactor::Supernode& node = factor_.supernodes_[k];
+      const Supernode& node = factor_.supernodes_[k];
       const std::int32_t* const rows = factor_.rows_.data() + node.first_row;
       for (std::size_t begin = 0, end = 0; begin < node.row_count; begin = end) {
         const std::int32_t target = node_of[rows[begin]];
@@ -66,7 +66,7 @@ void SingleCholesky::find_updates() {
   };
   for_updates([&](std::size_t k, std::int32_t target, std::size_t begin, std::size_t end) {
     ++first_update_[target + 1];
-    const SingleFactor::Supernode& node = factor_.supernodes_[k];
+    const Supernode& node = factor_.supernodes_[k];
     update_work_[target] += static_cast<double>(node.columns) * static_cast<double>(end - begin) *
                             static_cast<double>(node.row_count - begin);
   });
@@ -86,7 +86,7 @@ SingleCholesky::Scratch& SingleCholesky::scratch_of_thread() {
 
 /// Loads the matrix's entries into the block, and fills the table of places in the block.
 void SingleCholesky::load(std::size_t node, const SymmetricRows& matrix, Scratch& own) {
-  const SingleFactor::Supernode& at = factor_.supernodes_[node];
+  const Supernode& at = factor_.supernodes_[node];
   const auto columns = static_cast<std::size_t>(at.columns);
   float* const block = factor_.values_.data() + at.first_value;
   std::fill_n(block, columns * (columns + at.row_count), 0.0f);
@@ -115,12 +115,12 @@ void SingleCholesky::load(std::size_t node, const SymmetricRows& matrix, Scratch
 /// Subtracts the updates by previously eliminated supernodes from rows begin to end - 1 of a supernode.
 void SingleCholesky::update_rows(std::size_t node, std::size_t begin, std::size_t end,
                                  const std::vector<std::int32_t>& place) {
-  const SingleFactor::Supernode& at = factor_.supernodes_[node];
+  const Supernode& at = factor_.supernodes_[node];
   const bool is_whole = begin == 0 && end == static_cast<std::size_t>(at.columns) + at.row_count;
   std::vector<float>& packed = scratch_of_thread().packed;
   for (std::size_t u = first_update_[node]; u < first_update_[node + 1]; ++u) {
     const Update& update = updates_[u];
-    const SingleFactor::Supernode& from = factor_.supernodes_[update.from];
+    const Supernode& from = factor_.supernodes_[update.from];
     const auto columns = static_cast<std::size_t>(from.columns);
     const std::size_t skipped = static_cast<std::size_t>(update.begin);
     const std::int32_t* const rows = factor_.rows_.data() + from.first_row + skipped;
@@ -143,7 +143,7 @@ void SingleCholesky::update_rows(std::size_t node, std::size_t begin, std::size_
 
 bool SingleCholesky::eliminate(std::size_t node, const SymmetricRows& matrix, const Workers& workers,
                                Scratch& own) {
-  const SingleFactor::Supernode& at = factor_.supernodes_[node];
+  const Supernode& at = factor_.supernodes_[node];
   const auto columns = static_cast<std::size_t>(at.columns);
   load(node, matrix, own);
   const std::size_t rows = columns + at.row_count;
@@ -169,13 +169,16 @@ bool SingleCholesky::eliminate(std::size_t node, const SymmetricRows& matrix, co
 bool SingleCholesky::factor(const SymmetricRows& matrix, const Workers& workers) {
   std::atomic<bool> is_good = true;
   const Workers alone(1);
-  workers.for_chunks(factor_.branches_.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
-    for (const auto& [first, last] : factor_.branches_[k].subtrees) {
-      for (std::int32_t node = first; node <= last && is_good; ++node) {
-        if (!eliminate(static_cast<std::size_t>(node), matrix, alone, scratch_of_thread())) is_good = false;
+  if (!factor_.stages_.empty()) {
+    const SingleFactor::Stage& branches = factor_.stages_.front();
+    workers.for_chunks(branches.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
+      for (const auto& [first, last] : branches[k].nodes) {
+        for (std::int32_t node = first; node <= last && is_good; ++node) {
+          if (!eliminate(static_cast<std::size_t>(node), matrix, alone, scratch_of_thread())) is_good = false;
+        }
       }
-    }
-  });
+    });
+  }
   for (const auto& [first, last] : factor_.trunk_) {
     for (std::int32_t node = first; node <= last && is_good; ++node)
       is_good = eliminate(static_cast<std::size_t>(node), matrix, workers, trunk_);

@@ -7,63 +7,14 @@
 namespace lpdeform {
 namespace {
 
-using Row = SingleFactor::Row;
-
-constexpr std::size_t kBranches = 16;
+/// The largest subtree of each stage's branches, as a share of the whole tree. The second and third stage leave 2 to 6 %
+/// of a surface's factor for one thread, and the first one alone leaves a fifth to a quarter.
+constexpr double kStages[] = {1.0 / 16, 1.0 / 4, 0.6};
 constexpr std::size_t kSmallestBranch = 1 << 14;  // entries; a smaller one is not worth a task
-constexpr std::size_t kChunk = 4096;              // rows
-
-/// x = L^-1 b for a supernode's own rows. `values` is a row-major triangle with inverted diagonal entries.
-void solve_triangle(const float* values, std::int32_t columns, Row* own) {
-  for (std::int32_t r = 0; r < columns; ++r, values += columns) {
-    Row sum = own[r];
-    for (std::int32_t c = 0; c < r; ++c) sum -= values[c] * own[c];
-    own[r] = sum * values[r];
-  }
-}
-
-void solve_transposed_triangle(const float* values, std::int32_t columns, Row* own) {
-  for (std::int32_t r = columns; r-- > 0;) {
-    const float* const row = values + static_cast<std::size_t>(r) * static_cast<std::size_t>(columns);
-    const Row x = own[r] *= row[r];
-    for (std::int32_t c = 0; c < r; ++c) own[c] -= row[c] * x;
-  }
-}
-
-/// below[rows[r]] -= sum_c values[r][c] own[c]; Four rows at a time, so that the sums are independent of each other.
-void add_below(const float* values, std::int32_t columns, const std::int32_t* rows, std::size_t row_count,
-               const Row* own, Row* below) {
-  std::size_t r = 0;
-  for (; r + 4 <= row_count; r += 4, values += 4 * columns) {
-    Row sum[4] = {};
-    for (std::int32_t c = 0; c < columns; ++c) {
-      for (int k = 0; k < 4; ++k) sum[k] += values[k * columns + c] * own[c];
-    }
-    for (int k = 0; k < 4; ++k) below[rows[r + k]] -= sum[k];
-  }
-  for (; r < row_count; ++r, values += columns) {
-    Row sum = {};
-    for (std::int32_t c = 0; c < columns; ++c) sum += values[c] * own[c];
-    below[rows[r]] -= sum;
-  }
-}
-
-/// own[c] -= sum_r values[r][c] below[rows[r]].
-void add_from_below(const float* values, std::int32_t columns, const std::int32_t* rows,
-                    std::size_t row_count, Row* own, const Row* below) {
-  std::size_t r = 0;
-  for (; r + 4 <= row_count; r += 4, values += 4 * columns) {
-    const Row b0 = below[rows[r]], b1 = below[rows[r + 1]], b2 = below[rows[r + 2]], b3 = below[rows[r + 3]];
-    for (std::int32_t c = 0; c < columns; ++c) {
-      own[c] -= (values[c] * b0 + values[columns + c] * b1) +
-                (values[2 * columns + c] * b2 + values[3 * columns + c] * b3);
-    }
-  }
-  for (; r < row_count; ++r, values += columns) {
-    const Row x = below[rows[r]];
-    for (std::int32_t c = 0; c < columns; ++c) own[c] -= values[c] * x;
-  }
-}
+constexpr std::size_t kWorthBranches =
+    4 * kSmallestBranch;                                    // entries of a whole factor that is worth a stage
+constexpr std::size_t kWorthStages = 64 * kSmallestBranch;  // and of one that is worth all of them
+constexpr std::size_t kChunk = 4096;                        // rows
 
 }  // namespace
 
@@ -105,52 +56,77 @@ std::vector<std::int32_t> SingleFactor::parents() const {
   return result;
 }
 
-/// Cuts the tree where the subtrees become small enough, and groups these into branches of about equal size.
-void SingleFactor::cut_branches() {
-  branches_.clear();
-  trunk_.clear();
+/// Cuts the tree where the subtrees become small enough for each stage, and groups what is new in them into branches.
+void SingleFactor::cut_stages() {
+  stages_.clear();
   const auto count = static_cast<std::int32_t>(supernodes_.size());
   const std::vector<std::int32_t> parent = parents();
-  std::vector<std::size_t> work(count), nodes(count, 1);  // of the subtree rooted at each supernode
-  std::vector<char> is_whole(count, true);  // this subtree, and each in it, has consecutive supernodes
-  std::vector<std::int32_t> first(count);
-  for (std::int32_t k = 0; k < count; ++k) first[k] = k;
+  std::vector<std::size_t> entries(count), work(count);  // of each supernode, of the subtree below it
   for (std::int32_t k = 0; k < count; ++k) {
     const Supernode& node = supernodes_[k];
-    work[k] +=
+    entries[k] =
         static_cast<std::size_t>(node.columns) * (static_cast<std::size_t>(node.columns) + node.row_count);
-    is_whole[k] = is_whole[k] && nodes[k] == static_cast<std::size_t>(k - first[k] + 1);
-    if (parent[k] < 0) continue;
-    is_whole[parent[k]] = is_whole[parent[k]] && is_whole[k];
-    work[parent[k]] += work[k];
-    nodes[parent[k]] += nodes[k];
-    first[parent[k]] = std::min(first[parent[k]], first[k]);
+    work[k] += entries[k];
+    if (parent[k] >= 0) work[parent[k]] += work[k];
   }
-  const std::size_t most = std::max(values_.size() / kBranches, kSmallestBranch);
-  const bool is_worth_it = values_.size() >= 4 * kSmallestBranch;
-  const auto is_branch = [&](std::int32_t k) { return is_worth_it && work[k] <= most && is_whole[k]; };
-  std::size_t bundled = most;
-  for (std::int32_t k = 0; k < count; ++k) {
-    if (is_branch(k) && parent[k] >= 0 && is_branch(parent[k])) continue;  // part of its parent's branch
-    if (!is_branch(k)) {
-      trunk_.emplace_back(k, k);
-      continue;
+  std::vector<char> is_placed(count, false);
+  const auto append = [](std::vector<Range>& to, std::int32_t k) {
+    if (!to.empty() && to.back().second == k - 1)
+      ++to.back().second;
+    else
+      to.emplace_back(k, k);
+  };
+  const auto unplaced = [&] {
+    std::vector<Range> result;
+    for (std::int32_t k = 0; k < count; ++k) {
+      if (!is_placed[k]) append(result, k);
     }
-    if (bundled + work[k] > most) branches_.emplace_back(), bundled = 0;
-    bundled += work[k];
-    branches_.back().subtrees.emplace_back(first[k], k);
+    return result;
+  };
+  for (const double share : kStages) {
+    if (values_.size() < (stages_.empty() ? kWorthBranches : kWorthStages)) break;
+    const auto most =
+        std::max(static_cast<std::size_t>(share * static_cast<double>(values_.size())), kSmallestBranch);
+    // Of each supernode: the root of the largest subtree that is small enough, and what is new in this subtree.
+    std::vector<std::int32_t> root(count, -1), branch(count);
+    std::vector<std::size_t> new_entries(count);
+    for (std::int32_t k = count; k-- > 0;) {
+      if (is_placed[k] || work[k] > most) continue;
+      root[k] = parent[k] >= 0 && root[parent[k]] >= 0 ? root[parent[k]] : k;
+      new_entries[root[k]] += entries[k];
+    }
+    const std::size_t fullest = stages_.empty() ? most : kSmallestBranch;
+    std::size_t bundled = fullest;
+    Stage& stage = stages_.emplace_back();
+    for (std::int32_t k = 0; k < count; ++k) {
+      if (root[k] != k) continue;
+      if (bundled + new_entries[k] > fullest) stage.emplace_back(), bundled = 0;
+      bundled += new_entries[k];
+      branch[k] = static_cast<std::int32_t>(stage.size()) - 1;
+    }
+    for (std::int32_t k = 0; k < count; ++k) {
+      if (root[k] < 0) continue;
+      append(stage[branch[root[k]]].nodes, k);
+      is_placed[k] = true;
+    }
+    if (stages_.size() == 1) trunk_ = unplaced();
   }
+  top_ = unplaced();
+  if (stages_.empty()) trunk_ = top_;
 }
 
-/// A branch adds to its ancestors in places of its own in work_. They begin at `begin`; returns where they end.
+/// A branch adds to rows that are not its own in places of its own in work_. They begin at `begin`; returns where they
+/// end.
 std::size_t SingleFactor::send_elsewhere(Branch& branch, std::size_t begin) {
   std::vector<std::int32_t> place(new_to_old_.size(), -1);
-  for (const auto& [first, last] : branch.subtrees) {
+  for (const auto& [first, last] : branch.nodes) {
     const std::int32_t end = supernodes_[last].first_column + supernodes_[last].columns;
+    for (std::int32_t c = supernodes_[first].first_column; c < end; ++c) place[c] = c;
+  }
+  for (const auto& [first, last] : branch.nodes) {
     const std::size_t rows_end = supernodes_[last].first_row + supernodes_[last].row_count;
     for (std::size_t r = supernodes_[first].first_row; r < rows_end; ++r) {
       const std::int32_t row = rows_[r];
-      if (row < end) continue;
       if (place[row] < 0) {
         place[row] = static_cast<std::int32_t>(begin + branch.owed.size());
         branch.owed.push_back(row);
@@ -163,35 +139,24 @@ std::size_t SingleFactor::send_elsewhere(Branch& branch, std::size_t begin) {
 
 void SingleFactor::finish() {
   forward_rows_ = rows_;
-  cut_branches();
+  cut_stages();
   std::size_t places = new_to_old_.size();
-  for (Branch& branch : branches_) places = send_elsewhere(branch, places);
-  work_ = std::vector<Row>(places);
+  for (Stage& stage : stages_) {
+    for (Branch& branch : stage) places = send_elsewhere(branch, places);
+  }
+  work_ = std::vector<SolveRow>(places);
 }
 
 /// x = L^-1 b for supernodes first to last, in work_.
-void SingleFactor::solve_forward(std::size_t first, std::size_t last,
-                                 const std::vector<std::int32_t>& rows) const {
-  for (std::size_t k = first; k <= last; ++k) {
-    const Supernode& node = supernodes_[k];
-    Row* const own = work_.data() + node.first_column;
-    const float* const triangle = values_.data() + node.first_value;
-    solve_triangle(triangle, node.columns, own);
-    add_below(triangle + node.columns * node.columns, node.columns, rows.data() + node.first_row,
-              node.row_count, own, work_.data());
-  }
+void SingleFactor::solve_forward(std::int32_t first, std::int32_t last) const {
+  lpdeform::solve_forward(supernodes_.data() + first, supernodes_.data() + last + 1, values_.data(),
+                          forward_rows_.data(), work_.data());
 }
 
 /// x = L^-T b for supernodes last to first, in work_.
-void SingleFactor::solve_backward(std::size_t first, std::size_t last) const {
-  for (std::size_t k = last + 1; k-- > first;) {
-    const Supernode& node = supernodes_[k];
-    Row* const own = work_.data() + node.first_column;
-    const float* const triangle = values_.data() + node.first_value;
-    add_from_below(triangle + node.columns * node.columns, node.columns, rows_.data() + node.first_row,
-                   node.row_count, own, work_.data());
-    solve_transposed_triangle(triangle, node.columns, own);
-  }
+void SingleFactor::solve_backward(std::int32_t first, std::int32_t last) const {
+  lpdeform::solve_backward(supernodes_.data() + first, supernodes_.data() + last + 1, values_.data(),
+                           rows_.data(), work_.data());
 }
 
 double SingleFactor::largest_entry(const Points& b, const Workers& workers) const {
@@ -220,25 +185,29 @@ void SingleFactor::solve_to(const Points& b, Result& x, const Workers& workers, 
   workers.for_chunks(n, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const double* const row = b.data() + 3 * static_cast<std::size_t>(new_to_old_[i]);
-      work_[i] = Row{static_cast<float>(scale * row[0]), static_cast<float>(scale * row[1]),
-                     static_cast<float>(scale * row[2]), 0};
+      work_[i] = SolveRow{static_cast<float>(scale * row[0]), static_cast<float>(scale * row[1]),
+                          static_cast<float>(scale * row[2]), 0};
     }
   });
-  std::fill(work_.begin() + static_cast<std::ptrdiff_t>(n), work_.end(), Row{});
-  workers.for_chunks(branches_.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
-    for (const auto& [first, last] : branches_[k].subtrees) solve_forward(first, last, forward_rows_);
-  });
+  std::fill(work_.begin() + static_cast<std::ptrdiff_t>(n), work_.end(), SolveRow{});
   std::size_t place = n;
-  for (const Branch& branch : branches_) {
-    for (const std::int32_t row : branch.owed) work_[row] += work_[place++];
+  for (const Stage& stage : stages_) {
+    workers.for_chunks(stage.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
+      for (const auto& [first, last] : stage[k].nodes) solve_forward(first, last);
+    });
+    for (const Branch& branch : stage) {
+      for (const std::int32_t row : branch.owed) work_[row] += work_[place++];
+    }
   }
-  for (const auto& [first, last] : trunk_) solve_forward(first, last, rows_);
-  for (auto part = trunk_.rbegin(); part != trunk_.rend(); ++part) solve_backward(part->first, part->second);
-  workers.for_chunks(branches_.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
-    const auto& subtrees = branches_[k].subtrees;
-    for (auto part = subtrees.rbegin(); part != subtrees.rend(); ++part)
-      solve_backward(part->first, part->second);
-  });
+  for (const auto& [first, last] : top_) solve_forward(first, last);
+  for (auto part = top_.rbegin(); part != top_.rend(); ++part) solve_backward(part->first, part->second);
+  for (auto stage = stages_.rbegin(); stage != stages_.rend(); ++stage) {
+    workers.for_chunks(stage->size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
+      const std::vector<Range>& nodes = (*stage)[k].nodes;
+      for (auto part = nodes.rbegin(); part != nodes.rend(); ++part)
+        solve_backward(part->first, part->second);
+    });
+  }
   const double back = factor * largest;
   workers.for_chunks(n, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
@@ -259,7 +228,7 @@ void SingleFactor::solve(const Points& b, SinglePoints& x, const Workers& worker
 std::size_t SingleFactor::memory_bytes() const {
   return (new_to_old_.capacity() + 2 * rows_.capacity()) * sizeof(std::int32_t) +
          supernodes_.capacity() * sizeof(Supernode) + values_.capacity() * sizeof(float) +
-         work_.capacity() * sizeof(Row);
+         work_.capacity() * sizeof(SolveRow);
 }
 
 }  // namespace lpdeform

@@ -7,6 +7,7 @@
 
 #include "core/base/geometry.h"
 #include "core/base/workers.h"
+#include "core/linalg/solve_kernel.h"
 
 namespace lpdeform {
 
@@ -15,8 +16,9 @@ namespace lpdeform {
 /// for metrics (preconditioners), not for final results. Columns with the same pattern are grouped as supernodes.
 ///
 /// Several threads solve with large factors: different subtrees of the elimination tree are independent below their
-/// common ancestors. Each subtree accumulates its contributions to these ancestors in memory of its own, and these
-/// contributions are added up in a fixed order, which gives the same bits on any number of threads.
+/// common ancestors. Small subtrees come first, then what larger ones have above these, and so on: see Stage. Each
+/// branch accumulates its contributions to later ancestors in memory of its own, and these contributions are added up
+/// in a fixed order, which gives the same bits on any number of threads.
 class SingleFactor {
  public:
   // A backend fills it by begin(), add_supernode() in ascending order, and finish().
@@ -51,30 +53,26 @@ class SingleFactor {
 
   std::size_t memory_bytes() const;
 
-  /// x, y, z and padding: one vector register.
-  using Row = float __attribute__((vector_size(16)));
-
  private:
-  friend class SingleCholesky;  // computes the values in place
-  struct Supernode {
-    std::int32_t first_column, columns;
-    std::size_t first_row, row_count;  // in rows_
-    std::size_t first_value;           // in values_
-  };
-  /// Supernodes that one thread solves: complete subtrees, each of consecutive supernodes.
+  friend class SingleCholesky;                          // computes the values in place
+  using Range = std::pair<std::int32_t, std::int32_t>;  // of supernodes: first and last
+  /// Supernodes that one thread solves, ascending: parts of subtrees that no other branch of its stage has a part of.
   struct Branch {
-    std::vector<std::pair<std::int32_t, std::int32_t>> subtrees;  // first and last supernode
-    std::vector<std::int32_t> owed;                               // rows of ancestors that the branch adds to
+    std::vector<Range> nodes;
+    std::vector<std::int32_t>
+        owed;  // rows of ancestors in no branch or in one of a later stage, to which it adds
   };
+  /// Branches that are independent of each other once the earlier stages are done.
+  using Stage = std::vector<Branch>;
   double largest_entry(const Points& b, const Workers& workers) const;
   template <typename Result>
   void solve_to(const Points& b, Result& x, const Workers& workers, double factor) const;
   std::vector<std::int32_t> node_of_columns() const;
   std::vector<std::int32_t> parents() const;
-  void cut_branches();
+  void cut_stages();
   std::size_t send_elsewhere(Branch& branch, std::size_t begin);
-  void solve_forward(std::size_t first, std::size_t last, const std::vector<std::int32_t>& rows) const;
-  void solve_backward(std::size_t first, std::size_t last) const;
+  void solve_forward(std::int32_t first, std::int32_t last) const;
+  void solve_backward(std::int32_t first, std::int32_t last) const;
   float* new_supernode(std::int32_t columns, const std::int32_t* rows, std::size_t row_count);
 
   std::vector<std::int32_t> new_to_old_;
@@ -84,11 +82,12 @@ class SingleFactor {
   /// inverted.
   std::vector<float> values_;
   std::int32_t next_column_ = 0;
-  std::vector<Branch> branches_;
-  std::vector<std::pair<std::int32_t, std::int32_t>> trunk_;  // the supernodes that are in no branch
-  std::vector<std::int32_t> forward_rows_;  // rows_, but a branch's ancestor rows are its places in work_
+  std::vector<Stage> stages_;               // none for a small factor
+  std::vector<Range> trunk_;                // the supernodes that are not in the first stage
+  std::vector<Range> top_;                  // those that are in no stage
+  std::vector<std::int32_t> forward_rows_;  // rows_, but what a branch owes is its places in work_
   mutable std::vector<double> chunk_maxima_;
-  mutable std::vector<Row> work_;  // one for each column, then one for each row owed by each branch
+  mutable std::vector<SolveRow> work_;  // one for each column, then one for each row owed by each branch
 };
 
 }  // namespace lpdeform
