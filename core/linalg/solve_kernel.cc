@@ -2,7 +2,7 @@
 
 // This file is compiled once for each instruction set. The first call decides which version runs.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
-#ifdef __aarch64__  // once: Arm's sets of fixed width do the same here
+#ifdef __aarch64__  // once: Arm's sets of fixed width do the same here, and vectors of SVE can be in no arrays
 #define HWY_COMPILE_ONLY_STATIC
 #endif
 #define HWY_TARGET_INCLUDE "core/linalg/solve_kernel.cc"

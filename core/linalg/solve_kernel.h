@@ -16,8 +16,8 @@ struct Supernode {
   std::size_t first_value;           // where its values are among all values
 };
 
-/// work = L^-1 work for the columns of the supernodes from `first` to before `end`, ascending. What they take from row
-/// rows[k] below a triangle is taken from work[rows[k]]. Uses the processor's fused multiply-add where it has one.
+/// work = L^-1 work for the columns of the supernodes from `first` to before `end`, ascending. `rows` says where in
+/// `work` each row below a triangle is; it may be in another place than L's row. Uses fused multiply-add if it can.
 void solve_forward(const Supernode* first, const Supernode* end, const float* values,
                    const std::int32_t* rows, SolveRow* work);
 

@@ -65,6 +65,21 @@ TEST(Cholesky, ASinglePrecisionCopyCanBeMadeAgain) {
   }
 }
 
+TEST(SingleFactor, TakesLargeAndSmallCopiesInTurn) {
+  SingleFactor single;
+  for (const int side : {220, 20, 110, 220}) {  // with three stages of branches, with none and with one
+    const LowerMatrix matrix = square_laplacian(side);
+    SparseCholesky cholesky(matrix);
+    ASSERT_TRUE(cholesky.factor(matrix));
+    cholesky.copy_to(single);
+    const Points b = Points::Random(side * side, 3);
+    Points expected, x;
+    cholesky.solve(b, expected);
+    single.solve(b, x, Workers(2));
+    EXPECT_LT((x - expected).cwiseAbs().maxCoeff(), 1e-5) << side;
+  }
+}
+
 TEST(SingleFactor, GivesTheSameBitsOnAnyNumberOfThreadsAndTheRightOnes) {
   for (const auto& [side, shortcuts] : {std::pair{60, 0}, {150, 0}, {220, 300}, {220, 500}, {260, 700}}) {
     const LowerMatrix matrix = square_laplacian(side, shortcuts);

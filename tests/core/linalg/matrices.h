@@ -83,7 +83,7 @@ inline LowerMatrix with_shortcuts(const LowerMatrix& matrix, int count) {
 }
 
 /// The five-point Laplacian of a square, plus the identity: its tree has many branches. With `shortcuts`, that many pairs of
-/// points are joined in addition, so that subtrees are not all contiguous.
+/// points are joined in addition, so that the tree is unbalanced and its top is large.
 inline LowerMatrix square_laplacian(int side, int shortcuts = 0) {
   if (shortcuts > 0) return with_shortcuts(square_laplacian(side), shortcuts);
   LowerMatrix result;

@@ -49,6 +49,33 @@ TEST(SingleCholesky, GivesTheSameBitsOnAnyNumberOfThreadsAndTheRightOnes) {
   }
 }
 
+TEST(SingleCholesky, FactorsMatricesOfSeveralComponents) {
+  for (const int components : {2, 25}) {
+    const LowerMatrix one = square_laplacian(components == 2 ? 180 : 50);
+    LowerMatrix all;
+    all.columns.push_back(0);
+    for (int k = 0; k < components; ++k) {
+      const std::int32_t before = k * one.size();
+      const auto entries = static_cast<std::int32_t>(all.rows.size());
+      for (const std::int32_t row : one.rows) all.rows.push_back(before + row);
+      all.values.insert(all.values.end(), one.values.begin(), one.values.end());
+      for (std::int32_t c = 1; c <= one.size(); ++c) all.columns.push_back(entries + one.columns[c]);
+    }
+    SparseCholesky cholesky(all);
+    ASSERT_TRUE(cholesky.factor(all));
+    const Points b = Points::Random(all.size(), 3);
+    Points expected, alone, both;
+    cholesky.solve(b, expected);
+    SingleCholesky single = analysed(all);
+    ASSERT_TRUE(single.factor(RowsOf(all), Workers(1)));
+    single.result().solve(b, alone, Workers(1));
+    EXPECT_LT((alone - expected).cwiseAbs().maxCoeff(), 1e-5);
+    ASSERT_TRUE(single.factor(RowsOf(all), Workers(2)));
+    single.result().solve(b, both, Workers(2));
+    EXPECT_EQ(both, alone);
+  }
+}
+
 TEST(SingleCholesky, FactorsOtherValuesOfThePattern) {
   LowerMatrix matrix = square_laplacian(40);
   SingleCholesky single = analysed(matrix);

@@ -6,6 +6,9 @@
 #include <hwy/highway.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -23,7 +26,7 @@ class SolveKernel : public testing::TestWithParam<std::int64_t> {
 /// Two supernodes of a factor L: the first has rows in the second and behind it, the second only behind it.
 struct TwoSupernodes {
   TwoSupernodes(int columns, int below)
-      : size(2 * columns + 2 * below), l(Eigen::MatrixXf::Zero(2 * columns, 2 * columns)) {
+      : size(2 * columns + 2 * below), l(Eigen::MatrixXf::Zero(size, size)) {
     const Eigen::MatrixXf random = Eigen::MatrixXf::Random(size, 2 * columns);
     const auto add = [&](int first_column, const std::vector<int>& with_rows) {
       nodes.push_back({first_column, columns, rows.size(), with_rows.size(), values.size()});
@@ -45,7 +48,6 @@ struct TwoSupernodes {
         }
       }
     };
-    l = Eigen::MatrixXf::Zero(size, size);
     l.diagonal().tail(2 * below).setOnes();
     std::vector<int> of_first, of_second;
     for (int k = 0; k < below; ++k) {
