@@ -153,7 +153,8 @@ HWY_INLINE void solve_transposed_rows(const float* triangle, std::size_t columns
 
 void SolveBackward(const Supernode* first, const Supernode* end, const float* all_values,
                    const std::int32_t* all_rows, SolveRow* work) {
-  while (end-- != first) {
+  while (end != first) {
+    --end;
     const auto columns = static_cast<std::size_t>(end->columns);
     SolveRow* const own = work + end->first_column;
     const float* const triangle = all_values + end->first_value;
