@@ -32,14 +32,6 @@ HWY_INLINE void store(const Matrix& m, double* at) {
   for (std::size_t e = 0; e < 9; ++e) hn::StoreU(m.m[e / 3][e % 3], d, at + e * kLanes);
 }
 
-HWY_INLINE Matrix zero_matrix() {
-  Matrix m;
-  for (auto& row : m.m) {
-    for (V& entry : row) entry = hn::Zero(D());
-  }
-  return m;
-}
-
 HWY_INLINE Matrix load_matrix(const double* at) {
   const D d;
   Matrix m;
@@ -47,45 +39,44 @@ HWY_INLINE Matrix load_matrix(const double* at) {
   return m;
 }
 
-/// What the fit needs of a cell's edges.
-struct FitSums {
-  Matrix b;      // sum_j w_ij (x_i - x_j) (p_i - p_j)^T
-  V moved_size;  // sum_j w_ij |x_i - x_j|^2
-};
-
 constexpr std::size_t kEdge =
     6 * kLanes;  // numbers of a slot in the buffer of edges: x_i - x_j, then p_i - p_j
 
-/// Writes the edges of the lanes from `lane` on to `edges`, as [slot][axis][lane], and returns the sums that the fit
-/// needs.
-HWY_INLINE FitSums gather_edges(const CellBlocks& blocks, std::size_t block, std::size_t lane,
-                                const double* rows, double* edges) {
-  const D d;
-  FitSums sums{zero_matrix(), hn::Zero(d)};
+/// Writes the edges of the lanes from `lane` on to `edges`, as [slot][axis][lane].
+HWY_INLINE void gather_edges(const CellBlocks& blocks, std::size_t block, std::size_t lane,
+                             const double* rows, double* edges) {
   std::int32_t cells[kLanes];
-  for (std::size_t k = 0; k < hn::Lanes(d); ++k)
+  for (std::size_t k = 0; k < hn::Lanes(D()); ++k)
     cells[k] = std::max(blocks.cells[block * kLanes + lane + k], 0);
   const Vector centre = gather(rows, cells), rest_centre = gather_packed(blocks.rest, cells);
   for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1];
        ++slot, edges += kEdge) {
     const std::int32_t* const neighbours = blocks.neighbour.data() + slot * kLanes + lane;
-    const Vector edge = difference(centre, gather(rows, neighbours));
-    const Vector rest = difference(rest_centre, gather_packed(blocks.rest, neighbours));
-    store(edge, edges + lane);
-    store(rest, edges + 3 * kLanes + lane);
+    store(difference(centre, gather(rows, neighbours)), edges + lane);
+    store(difference(rest_centre, gather_packed(blocks.rest, neighbours)), edges + 3 * kLanes + lane);
+  }
+}
+
+/// What the fit needs of the edges of the lanes from `lane` on: b = sum_j w_ij (x_i - x_j) (p_i - p_j)^T, and
+/// moved_size = sum_j w_ij |x_i - x_j|^2.
+HWY_INLINE void add_edges(const CellBlocks& blocks, std::size_t block, std::size_t lane, const double* edges,
+                          Matrix& b, V& moved_size) {
+  const D d;
+  V xx = hn::Zero(d), xy = hn::Zero(d), xz = hn::Zero(d);
+  V yx = hn::Zero(d), yy = hn::Zero(d), yz = hn::Zero(d);
+  V zx = hn::Zero(d), zy = hn::Zero(d), zz = hn::Zero(d), size = hn::Zero(d);
+  for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1];
+       ++slot, edges += kEdge) {
+    const Vector edge = load(edges + lane), rest = load(edges + 3 * kLanes + lane);
     const V w = hn::LoadU(d, blocks.weight.data() + slot * kLanes + lane);
     const Vector we{hn::Mul(w, edge.x), hn::Mul(w, edge.y), hn::Mul(w, edge.z)};
-    sums.moved_size = hn::Add(sums.moved_size, dot(we, edge));
-    const auto add = [&](int r, V scale) {
-      sums.b.m[r][0] = hn::MulAdd(scale, rest.x, sums.b.m[r][0]);
-      sums.b.m[r][1] = hn::MulAdd(scale, rest.y, sums.b.m[r][1]);
-      sums.b.m[r][2] = hn::MulAdd(scale, rest.z, sums.b.m[r][2]);
-    };
-    add(0, we.x);
-    add(1, we.y);
-    add(2, we.z);
+    size = hn::MulAdd(we.x, edge.x, hn::MulAdd(we.y, edge.y, hn::MulAdd(we.z, edge.z, size)));
+    xx = hn::MulAdd(we.x, rest.x, xx), xy = hn::MulAdd(we.x, rest.y, xy), xz = hn::MulAdd(we.x, rest.z, xz);
+    yx = hn::MulAdd(we.y, rest.x, yx), yy = hn::MulAdd(we.y, rest.y, yy), yz = hn::MulAdd(we.y, rest.z, yz);
+    zx = hn::MulAdd(we.z, rest.x, zx), zy = hn::MulAdd(we.z, rest.y, zy), zz = hn::MulAdd(we.z, rest.z, zz);
   }
-  return sums;
+  b = {{{xx, xy, xz}, {yx, yy, yz}, {zx, zy, zz}}};
+  moved_size = size;
 }
 
 /// Computes the residuals, and E_i^2 as a sum of squares, which has no cancellation where it is small.
@@ -108,14 +99,17 @@ HWY_INLINE void subtract_rotated(const CellBlocks& blocks, std::size_t block, st
 }
 
 /// Fits all lanes of a block.
-HWY_INLINE void fit_block(const FitSums (&sums)[kVectors], const double* rest_size, double* rotations) {
+HWY_INLINE void fit_block(const CellBlocks& blocks, std::size_t block, const double* edges,
+                          double* rotations) {
   const D d;
   Matrix b[kVectors], rotation[kVectors];
   V bound[kVectors];
   M is_good[kVectors];
+  const double* const rest_size = blocks.rest_size.data() + block * kLanes;
   for (std::size_t v = 0; v < kVectors; ++v) {
-    b[v] = sums[v].b;
-    bound[v] = hn::Sqrt(hn::Mul(sums[v].moved_size, hn::LoadU(d, rest_size + v * hn::Lanes(d))));
+    const std::size_t lane = v * hn::Lanes(d);
+    add_edges(blocks, block, lane, edges, b[v], bound[v]);
+    bound[v] = hn::Sqrt(hn::Mul(bound[v], hn::LoadU(d, rest_size + lane)));
   }
   fit(b, bound, rotation, is_good);
   for (std::size_t v = 0; v < kVectors; ++v) {
@@ -137,11 +131,9 @@ void EvaluateBlocks(const CellBlocks& blocks, std::size_t first, std::size_t las
   std::vector<double> edges(blocks.most_slots * kEdge);
   double fitted[9 * kLanes], squares[kLanes];
   for (std::size_t block = first; block < last; ++block) {
-    FitSums sums[kVectors];
-    for (std::size_t v = 0; v < kVectors; ++v)
-      sums[v] = gather_edges(blocks, block, v * lanes, rows, edges.data());
+    for (std::size_t v = 0; v < kVectors; ++v) gather_edges(blocks, block, v * lanes, rows, edges.data());
     double* const rotations = state.rotations.empty() ? fitted : state.rotations.data() + block * 9 * kLanes;
-    if (is_fit) fit_block(sums, blocks.rest_size.data() + block * kLanes, rotations);
+    if (is_fit) fit_block(blocks, block, edges.data(), rotations);
     for (std::size_t v = 0; v < kVectors; ++v)
       subtract_rotated(blocks, block, v * lanes, edges.data(), rotations, squares, state);
     const std::int32_t* const cells = blocks.cells.data() + block * kLanes;

@@ -119,10 +119,7 @@ void CellPass::gradient(Points& result) const {
   workers_.for_chunks(c_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     gradient_of_blocks(blocks_, begin / kLanes, (end + kLanes - 1) / kLanes, state_, c.data(), result.data());
   });
-  if (!membrane_) return;
-  workers_.for_chunks(c_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
-    membrane_->add_gradient(stretched_c_, begin, end, result);
-  });
+  if (membrane_) membrane_->add_gradient(stretched_c_, workers_, result);
 }
 
 /// Most methods need no rotations. The others have the last x evaluated again, which changes nothing else.

@@ -8,7 +8,7 @@
 namespace lpdeform {
 namespace {
 
-constexpr std::size_t kChunk = 1024;  // faces
+constexpr std::size_t kChunk = 1024;  // faces or vertices
 
 /// The faces at marked vertices.
 std::optional<Faces> faces_at(const Faces& all, const std::vector<char>& cells) {
@@ -71,27 +71,38 @@ double Membrane::share(std::int32_t i) const {
   return sum / 3;
 }
 
-void Membrane::add_gradient(const std::vector<double>& c, std::size_t begin, std::size_t end,
-                            Points& result) const {
+void Membrane::add_gradient(const std::vector<double>& c, const Workers& workers, Points& result) {
   using Row = double __attribute__((vector_size(kRow * sizeof(double))));
   using SingleRow = float __attribute__((vector_size(kRow * sizeof(float)), aligned(sizeof(float))));
   const Faces& faces = corners();
-  for (std::size_t i = begin; i < end; ++i) {
-    Row sum{};
-    for (std::int32_t k = offsets_[i]; k < offsets_[i + 1]; ++k) {
-      const std::int32_t t = places_[k] / 3, corner = places_[k] % 3;
-      const double weight = c[faces(t, 0)] + c[faces(t, 1)] + c[faces(t, 2)];
-      const auto* const of = reinterpret_cast<const SingleRow*>(faces_.derivatives.data() +
-                                                                2 * kRow * static_cast<std::size_t>(t));
-      const SingleRow own = corner == 0 ? -of[0] - of[1] : of[corner - 1];
-      sum += weight * __builtin_convertvector(own, Row);
+  weights_.resize(static_cast<std::size_t>(faces.rows()));
+  workers.for_chunks(weights_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const auto row = static_cast<Eigen::Index>(t);
+      weights_[t] = (c[faces(row, 0)] + c[faces(row, 1)] + c[faces(row, 2)]) / 3;
     }
-    for (int e = 0; e < 3; ++e) result(static_cast<Eigen::Index>(i), e) += sum[e] / 3;
-  }
+  });
+  const auto derivative = [&](std::size_t t, std::size_t corner) -> const SingleRow& {
+    return *reinterpret_cast<const SingleRow*>(faces_.derivatives.data() +
+                                               MembraneFaces::derivative(t, corner));
+  };
+  workers.for_chunks(c.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      Row sum{};
+      for (std::int32_t k = offsets_[i]; k < offsets_[i + 1]; ++k) {
+        const auto t = static_cast<std::size_t>(places_[k] / 3);
+        const std::int32_t corner = places_[k] % 3;
+        const SingleRow own = corner == 0 ? -derivative(t, 0) - derivative(t, 1) : derivative(t, corner - 1);
+        sum += weights_[t] * __builtin_convertvector(own, Row);
+      }
+      for (int e = 0; e < 3; ++e) result(static_cast<Eigen::Index>(i), e) += sum[e];
+    }
+  });
 }
 
 std::size_t Membrane::memory_bytes() const {
-  return faces_.memory_bytes() + (offsets_.capacity() + places_.capacity()) * sizeof(std::int32_t) +
+  return faces_.memory_bytes() + weights_.capacity() * sizeof(double) +
+         (offsets_.capacity() + places_.capacity()) * sizeof(std::int32_t) +
          (some_ ? some_->size() * sizeof(std::int32_t) : 0);
 }
 

@@ -28,8 +28,8 @@ class Membrane {
   void evaluate(const double* rows, const Workers& workers);
   /// A third of the sum of E_T^2 over the faces at vertex i. Of a vertex that is not marked, some faces may be missing.
   double share(std::int32_t i) const;
-  /// Adds sum_T (c_a + c_b + c_c) / 3 dE_T^2/dx to rows begin to end - 1 of `result`, (a, b, c) = T.
-  void add_gradient(const std::vector<double>& c, std::size_t begin, std::size_t end, Points& result) const;
+  /// Adds sum_T (c_a + c_b + c_c) / 3 dE_T^2/dx to `result`, (a, b, c) = T.
+  void add_gradient(const std::vector<double>& c, const Workers& workers, Points& result);
 
   std::size_t memory_bytes() const;
 
@@ -39,6 +39,7 @@ class Membrane {
   std::shared_ptr<const RestShape> shape_;
   std::optional<Faces> some_;  // the faces, unless it has all
   MembraneFaces faces_;
+  std::vector<double> weights_;                 // of each face, in add_gradient()
   std::vector<std::int32_t> offsets_, places_;  // of each vertex: 3 * face + corner
 };
 

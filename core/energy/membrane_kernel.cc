@@ -34,18 +34,10 @@ HWY_INLINE Vector cross(const Vector& a, const Vector& b) {
           hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x))};
 }
 
-/// One row of kRow numbers for each lane, `stride` numbers apart.
-HWY_INLINE void store_rows(const Vector& v, std::size_t stride, float* to) {
-  double x[kLanes], y[kLanes], z[kLanes];
-  const D d;
-  hn::StoreU(v.x, d, x);
-  hn::StoreU(v.y, d, y);
-  hn::StoreU(v.z, d, z);
-  for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane, to += stride) {
-    to[0] = static_cast<float>(x[lane]);
-    to[1] = static_cast<float>(y[lane]);
-    to[2] = static_cast<float>(z[lane]);
-  }
+/// One row of kRow numbers for each lane, one after another.
+HWY_INLINE void store_rows(const Vector& v, float* to) {
+  const hn::Rebind<float, D> d;
+  hn::StoreInterleaved4(hn::DemoteTo(d, v.x), hn::DemoteTo(d, v.y), hn::DemoteTo(d, v.z), hn::Zero(d), d, to);
 }
 
 /// The faces from `first` on, one for each lane. `corner` has the vertices of each corner.
@@ -71,10 +63,9 @@ HWY_INLINE void evaluate_lanes(const std::int32_t (&corner)[3][kLanes], std::siz
   const V size = hn::Mul(hn::Set(d, 4.0), area), along = hn::Mul(size, hn::Sub(one, over)),
           across = hn::Neg(hn::Mul(size, k));
   const Vector by_f = sum_of(along, f, across, cross(g, n)), by_g = sum_of(along, g, across, cross(n, f));
-  constexpr std::size_t kNumbers = 2 * kRow;  // of the derivatives of a face
-  float* const derivatives = faces.derivatives.data() + first * kNumbers;
-  store_rows(sum_of(i00, by_f, i01, by_g), kNumbers, derivatives);
-  store_rows(scaled(i11, by_g), kNumbers, derivatives + kRow);
+  float* const derivatives = faces.derivatives.data() + MembraneFaces::derivative(first, 0);
+  store_rows(sum_of(i00, by_f, i01, by_g), derivatives);
+  store_rows(scaled(i11, by_g), derivatives + kLanes * kRow);
 }
 
 void EvaluateFaces(const Faces& corners, std::size_t begin, std::size_t end, const double* rows,

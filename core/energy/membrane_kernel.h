@@ -5,6 +5,7 @@
 
 #include "core/base/geometry.h"
 #include "core/energy/cell_blocks.h"
+#include "core/energy/cell_kernel.h"
 
 namespace lpdeform {
 
@@ -20,8 +21,12 @@ struct MembraneFaces {
   std::vector<double> inverse[3];  // of the rest edges in the face's plane, upper triangular: 00, 01, 11
   std::vector<double> area;
   std::vector<double> squared;  // E_T^2
-  std::vector<float>
-      derivatives;  // [face][second or third corner][axis, filler]: dE_T^2, in single precision
+  /// dE_T^2 in single precision: [face / kLanes][second or third corner][face % kLanes][axis, filler].
+  std::vector<float> derivatives;
+  /// Where that of the second corner of face t (`corner` 0) or of the third one (1) begins.
+  static std::size_t derivative(std::size_t t, std::size_t corner) {
+    return ((t / kLanes * 2 + corner) * kLanes + t % kLanes) * kRow;
+  }
 };
 
 /// Computes faces begin to end - 1, which are `corners`, where their vertices are at `rows`: x, y, z and a filler for each vertex, in

@@ -1,4 +1,5 @@
-// Fits the rotations of many cells at a time, one per lane: the method of rotation_fit.cc in vector instructions.
+// Fits the rotations of many cells at a time, one per lane: the method of rotation_fit.cc in vector instructions. All but the last
+// Newton step is in single precision.
 // cell_kernel.cc and membrane_kernel.cc include this file once for each instruction set, as Highway requires; hence this include guard.
 #if defined(LPDEFORM_ROTATION_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef LPDEFORM_ROTATION_LANES_INL_H
@@ -22,6 +23,12 @@ using V = hn::Vec<D>;
 using M = hn::Mask<D>;
 
 constexpr std::size_t kVectors = kLanes / hn::MaxLanes(D());  // vectors per block
+
+// The same in single precision, in which rotations are first found.
+using SingleD = hn::CappedTag<float, kLanes>;
+using S = hn::Vec<SingleD>;
+constexpr std::size_t kSingleVectors = kLanes / hn::MaxLanes(SingleD());
+constexpr double kNear = 2e-6;  // radians; a Newton step that is no longer is the last
 
 struct Vector {
   V x, y, z;
@@ -62,50 +69,43 @@ HWY_INLINE void store(const Vector& v, double* at) {
 }
 
 #if HWY_TARGET == HWY_AVX2
-/// The columns of four rows.
-HWY_INLINE Vector transposed(V r0, V r1, V r2, V r3) {
+/// The rows of these vertices, `stride` numbers apart. Loads of two numbers leave only shuffles within halves of a vector.
+template <std::size_t stride>
+HWY_INLINE Vector gather_rows(const double* rows, const std::int32_t* indices) {
   const D d;
-  const V xz01 = hn::InterleaveLower(d, r0, r1), y01 = hn::InterleaveUpper(d, r0, r1);
-  const V xz23 = hn::InterleaveLower(d, r2, r3), y23 = hn::InterleaveUpper(d, r2, r3);
-  return {hn::ConcatLowerLower(d, xz23, xz01), hn::ConcatLowerLower(d, y23, y01),
-          hn::ConcatUpperUpper(d, xz23, xz01)};
+  const hn::FixedTag<double, 2> pair;
+  const auto pairs = [&](int low, int high, std::size_t from) {
+    const auto at = [&](int k) {
+      return hn::LoadU(pair, rows + stride * static_cast<std::size_t>(indices[k]) + from);
+    };
+    return hn::Combine(d, at(high), at(low));
+  };
+  const V xy02 = pairs(0, 2, 0), xy13 = pairs(1, 3, 0), yz02 = pairs(0, 2, 1), yz13 = pairs(1, 3, 1);
+  return {hn::InterleaveLower(d, xy02, xy13), hn::InterleaveUpper(d, xy02, xy13),
+          hn::InterleaveUpper(d, yz02, yz13)};
+}
+#else
+template <std::size_t stride>
+HWY_INLINE Vector gather_rows(const double* rows, const std::int32_t* indices) {
+  const D d;
+  const hn::RebindToSigned<D> wide;
+  const hn::Rebind<std::int32_t, D> narrow;
+  static_assert(stride == kRow || stride == 3);
+  const auto vertex = hn::PromoteTo(wide, hn::LoadU(narrow, indices));
+  const auto index = stride == kRow ? hn::ShiftLeft<2>(vertex) : hn::Add(vertex, hn::ShiftLeft<1>(vertex));
+  return {hn::GatherIndex(d, rows, index), hn::GatherIndex(d, rows + 1, index),
+          hn::GatherIndex(d, rows + 2, index)};
 }
 #endif
 
 /// Gathers the rows of these vertices, kRow numbers each.
 HWY_INLINE Vector gather(const double* rows, const std::int32_t* indices) {
-  const D d;
-#if HWY_TARGET == HWY_AVX2
-  const hn::FixedTag<double, 4> quad;
-  const auto row = [&](int k) { return hn::LoadU(quad, rows + kRow * static_cast<std::size_t>(indices[k])); };
-  return transposed(row(0), row(1), row(2), row(3));
-#else
-  const hn::RebindToSigned<D> wide;
-  const hn::Rebind<std::int32_t, D> narrow;
-  const auto index = hn::ShiftLeft<2>(hn::PromoteTo(wide, hn::LoadU(narrow, indices)));
-  return {hn::GatherIndex(d, rows, index), hn::GatherIndex(d, rows + 1, index),
-          hn::GatherIndex(d, rows + 2, index)};
-#endif
+  return gather_rows<kRow>(rows, indices);
 }
 
 /// Gathers the rows of these vertices, three numbers each.
 HWY_INLINE Vector gather_packed(const double* rows, const std::int32_t* indices) {
-  const D d;
-#if HWY_TARGET == HWY_AVX2
-  const hn::FixedTag<double, 4> quad;
-  const auto three = hn::FirstN(quad, 3);
-  const auto row = [&](int k) {
-    return hn::MaskedLoad(three, quad, rows + 3 * static_cast<std::size_t>(indices[k]));
-  };
-  return transposed(row(0), row(1), row(2), row(3));
-#else
-  const hn::RebindToSigned<D> wide;
-  const hn::Rebind<std::int32_t, D> narrow;
-  const auto vertex = hn::PromoteTo(wide, hn::LoadU(narrow, indices));
-  const auto index = hn::Add(vertex, hn::ShiftLeft<1>(vertex));
-  return {hn::GatherIndex(d, rows, index), hn::GatherIndex(d, rows + 1, index),
-          hn::GatherIndex(d, rows + 2, index)};
-#endif
+  return gather_rows<3>(rows, indices);
 }
 
 /// Stores consecutive rows of three numbers in single precision, one row per lane.
@@ -136,19 +136,18 @@ HWY_INLINE Quaternion product(const Quaternion& p, const Quaternion& q) {
           sum(p.w, q.y, nx, q.z, p.y, q.w, p.z, q.x), sum(p.w, q.z, p.x, q.y, ny, q.x, p.z, q.w)};
 }
 
-HWY_INLINE V determinant(const V (&m)[3][3]) {
+HWY_INLINE S determinant(const S (&m)[3][3]) {
   const auto minor = [&](int a, int b) { return hn::MulSub(m[1][a], m[2][b], hn::Mul(m[1][b], m[2][a])); };
   return hn::MulAdd(m[0][0], minor(1, 2), hn::NegMulAdd(m[0][1], minor(0, 2), hn::Mul(m[0][2], minor(0, 1))));
 }
 
 /// Davenport's symmetric 4x4 matrix of B (see rotation_fit.cc), upper triangle.
 struct Davenport {
-  V k00, k01, k02, k03, k11, k12, k13, k22, k23, k33;
+  S k00, k01, k02, k03, k11, k12, k13, k22, k23, k33;
 };
 
-HWY_INLINE Davenport davenport(const Matrix& b) {
-  const auto& m = b.m;
-  const V yz = hn::Add(m[1][1], m[2][2]), yz_difference = hn::Sub(m[1][1], m[2][2]);
+HWY_INLINE Davenport davenport(const S (&m)[3][3]) {
+  const S yz = hn::Add(m[1][1], m[2][2]), yz_difference = hn::Sub(m[1][1], m[2][2]);
   return {hn::Add(m[0][0], yz),      hn::Sub(m[2][1], m[1][2]),
           hn::Sub(m[0][2], m[2][0]), hn::Sub(m[1][0], m[0][1]),
           hn::Sub(m[0][0], yz),      hn::Add(m[0][1], m[1][0]),
@@ -158,11 +157,11 @@ HWY_INLINE Davenport davenport(const Matrix& b) {
 
 /// The 2x2 minors of the upper two rows and of the lower two rows of a symmetric 4x4 matrix.
 struct Minors {
-  V s0, s1, s2, s3, s4, s5, c0, c1, c2, c3, c4, c5;
+  S s0, s1, s2, s3, s4, s5, c0, c1, c2, c3, c4, c5;
 };
 
 HWY_INLINE Minors minors(const Davenport& k) {
-  const auto minor = [](V a, V b, V c, V d) { return hn::MulSub(a, d, hn::Mul(b, c)); };
+  const auto minor = [](S a, S b, S c, S d) { return hn::MulSub(a, d, hn::Mul(b, c)); };
   return {minor(k.k00, k.k01, k.k01, k.k11), minor(k.k00, k.k02, k.k01, k.k12),
           minor(k.k00, k.k03, k.k01, k.k13), minor(k.k01, k.k02, k.k11, k.k12),
           minor(k.k01, k.k03, k.k11, k.k13), minor(k.k02, k.k03, k.k12, k.k13),
@@ -171,35 +170,35 @@ HWY_INLINE Minors minors(const Davenport& k) {
           minor(k.k12, k.k23, k.k13, k.k33), minor(k.k22, k.k23, k.k23, k.k33)};
 }
 
-HWY_INLINE V determinant(const Minors& m) {
-  const V plus = hn::MulAdd(m.s0, m.c5, hn::MulAdd(m.s2, m.c3, hn::MulAdd(m.s3, m.c2, hn::Mul(m.s5, m.c0))));
+HWY_INLINE S determinant(const Minors& m) {
+  const S plus = hn::MulAdd(m.s0, m.c5, hn::MulAdd(m.s2, m.c3, hn::MulAdd(m.s3, m.c2, hn::Mul(m.s5, m.c0))));
   return hn::NegMulAdd(m.s1, m.c4, hn::NegMulAdd(m.s4, m.c1, plus));
 }
 
 /// x^4 - 2 |B|^2 x^2 - 8 det(B) x + det(K), and an upper bound of its largest root.
 struct Quartic {
-  V c2, c1, c0, bound;
+  S c2, c1, c0, bound;
 };
 
 /// The largest roots, by Newton's method from above, which descends monotonically. All vectors are iterated together,
 /// because each one waits for its own divisions.
-HWY_INLINE void largest_roots(const Quartic (&q)[kVectors], V (&x)[kVectors]) {
-  const D d;
-  const V four = hn::Set(d, 4.0), enough = hn::Set(d, 1e-6);
-  M is_on[kVectors];
-  for (std::size_t v = 0; v < kVectors; ++v) {
+HWY_INLINE void largest_roots(const Quartic (&q)[kSingleVectors], S (&x)[kSingleVectors]) {
+  const SingleD d;
+  const S four = hn::Set(d, 4.0F), enough = hn::Set(d, 1e-4F);
+  hn::Mask<SingleD> is_on[kSingleVectors];
+  for (std::size_t v = 0; v < kSingleVectors; ++v) {
     x[v] = q[v].bound;
     is_on[v] = hn::Eq(x[v], x[v]);
   }
   for (int iteration = 0; iteration < 50; ++iteration) {
     bool is_done = true;
-    for (std::size_t v = 0; v < kVectors; ++v) {
-      const V x2 = hn::Mul(x[v], x[v]);
-      const V value = hn::MulAdd(hn::MulAdd(hn::Add(x2, q[v].c2), x[v], q[v].c1), x[v], q[v].c0);
-      const V slope = hn::MulAdd(hn::MulAdd(four, x2, hn::Add(q[v].c2, q[v].c2)), x[v], q[v].c1);
-      const V next = hn::Sub(x[v], hn::Div(value, slope));
+    for (std::size_t v = 0; v < kSingleVectors; ++v) {
+      const S x2 = hn::Mul(x[v], x[v]);
+      const S value = hn::MulAdd(hn::MulAdd(hn::Add(x2, q[v].c2), x[v], q[v].c1), x[v], q[v].c0);
+      const S slope = hn::MulAdd(hn::MulAdd(four, x2, hn::Add(q[v].c2, q[v].c2)), x[v], q[v].c1);
+      const S next = hn::Sub(x[v], hn::Div(value, slope));
       is_on[v] = hn::And(is_on[v], hn::And(hn::Gt(slope, hn::Zero(d)), hn::Lt(next, x[v])));
-      const M is_far = hn::Ge(hn::Sub(x[v], next), hn::Mul(enough, x[v]));
+      const auto is_far = hn::Ge(hn::Sub(x[v], next), hn::Mul(enough, x[v]));
       x[v] = hn::IfThenElse(is_on[v], next, x[v]);
       is_on[v] = hn::And(is_on[v], is_far);
       is_done = is_done && hn::AllFalse(d, is_on[v]);
@@ -208,27 +207,31 @@ HWY_INLINE void largest_roots(const Quartic (&q)[kVectors], V (&x)[kVectors]) {
   }
 }
 
-/// The null vector of the singular matrix k: the column of its adjugate with the largest diagonal entry, which
-/// is its longest. Not normalised.
-HWY_INLINE Quaternion null_vector(const Davenport& k) {
+struct SingleQuaternion {
+  S w, x, y, z;
+};
+
+/// The null vector of the singular matrix k, normalised: the column of its adjugate with the largest diagonal entry, which
+/// is its longest. Not finite if all columns are 0.
+HWY_INLINE SingleQuaternion null_vector(const Davenport& k) {
   const Minors m = minors(k);
-  const auto sum = [](V a, V b, V c, V d4, V e, V f) {  // a b - c d + e f
+  const auto sum = [](S a, S b, S c, S d4, S e, S f) {  // a b - c d + e f
     return hn::MulAdd(a, b, hn::NegMulAdd(c, d4, hn::Mul(e, f)));
   };
-  const V a00 = sum(k.k11, m.c5, k.k12, m.c4, k.k13, m.c3);
-  const V a01 = hn::Neg(sum(k.k01, m.c5, k.k02, m.c4, k.k03, m.c3));
-  const V a02 = sum(k.k13, m.s5, k.k23, m.s4, k.k33, m.s3);
-  const V a03 = hn::Neg(sum(k.k12, m.s5, k.k22, m.s4, k.k23, m.s3));
-  const V a11 = sum(k.k00, m.c5, k.k02, m.c2, k.k03, m.c1);
-  const V a12 = hn::Neg(sum(k.k03, m.s5, k.k23, m.s2, k.k33, m.s1));
-  const V a13 = sum(k.k02, m.s5, k.k22, m.s2, k.k23, m.s1);
-  const V a22 = sum(k.k03, m.s4, k.k13, m.s2, k.k33, m.s0);
-  const V a23 = hn::Neg(sum(k.k02, m.s4, k.k12, m.s2, k.k23, m.s0));
-  const V a33 = sum(k.k02, m.s3, k.k12, m.s1, k.k22, m.s0);
-  Quaternion q{a00, a01, a02, a03};
-  V longest = hn::Abs(a00);
-  const auto take_if_longer = [&](V diagonal, const Quaternion& other) {
-    const M is_longer = hn::Gt(hn::Abs(diagonal), longest);
+  const S a00 = sum(k.k11, m.c5, k.k12, m.c4, k.k13, m.c3);
+  const S a01 = hn::Neg(sum(k.k01, m.c5, k.k02, m.c4, k.k03, m.c3));
+  const S a02 = sum(k.k13, m.s5, k.k23, m.s4, k.k33, m.s3);
+  const S a03 = hn::Neg(sum(k.k12, m.s5, k.k22, m.s4, k.k23, m.s3));
+  const S a11 = sum(k.k00, m.c5, k.k02, m.c2, k.k03, m.c1);
+  const S a12 = hn::Neg(sum(k.k03, m.s5, k.k23, m.s2, k.k33, m.s1));
+  const S a13 = sum(k.k02, m.s5, k.k22, m.s2, k.k23, m.s1);
+  const S a22 = sum(k.k03, m.s4, k.k13, m.s2, k.k33, m.s0);
+  const S a23 = hn::Neg(sum(k.k02, m.s4, k.k12, m.s2, k.k23, m.s0));
+  const S a33 = sum(k.k02, m.s3, k.k12, m.s1, k.k22, m.s0);
+  SingleQuaternion q{a00, a01, a02, a03};
+  S longest = hn::Abs(a00);
+  const auto take_if_longer = [&](S diagonal, const SingleQuaternion& other) {
+    const auto is_longer = hn::Gt(hn::Abs(diagonal), longest);
     longest = hn::IfThenElse(is_longer, hn::Abs(diagonal), longest);
     q = {hn::IfThenElse(is_longer, other.w, q.w), hn::IfThenElse(is_longer, other.x, q.x),
          hn::IfThenElse(is_longer, other.y, q.y), hn::IfThenElse(is_longer, other.z, q.z)};
@@ -236,10 +239,12 @@ HWY_INLINE Quaternion null_vector(const Davenport& k) {
   take_if_longer(a11, {a01, a11, a12, a13});
   take_if_longer(a22, {a02, a12, a22, a23});
   take_if_longer(a33, {a03, a13, a23, a33});
-  return q;
+  const S length2 = hn::MulAdd(q.w, q.w, hn::MulAdd(q.x, q.x, hn::MulAdd(q.y, q.y, hn::Mul(q.z, q.z))));
+  const S shorten = hn::Div(hn::Set(SingleD(), 1.0F), hn::Sqrt(length2));
+  return {hn::Mul(q.w, shorten), hn::Mul(q.x, shorten), hn::Mul(q.y, shorten), hn::Mul(q.z, shorten)};
 }
 
-/// One Newton step for <R exp([w]x), B> at R = R(q). False if R is not near the maximum.
+/// One Newton step for <R exp([w]x), B> at R = R(q). The error falls with its third power. False if R was not near the maximum.
 HWY_INLINE M polish(const Matrix& b, Quaternion& q) {
   const D d;
   const Matrix r = rotation_of(q);
@@ -269,69 +274,117 @@ HWY_INLINE M polish(const Matrix& b, Quaternion& q) {
   const auto row = [&](V a, V b2, V c) { return hn::Mul(scale, dot({a, b2, c}, slope)); };
   const Vector w{row(ixx, ixy, ixz), row(ixy, iyy, iyz), row(ixz, iyz, izz)};
   const V size = dot(w, w);
-  is_good = hn::And(is_good, hn::Lt(size, hn::Set(d, 1e-12)));
+  is_good = hn::And(is_good, hn::Lt(size, hn::Set(d, kNear * kNear)));
   const V half = hn::Set(d, 0.5);
   q = product(q, {hn::Sqrt(hn::NegMulAdd(hn::Set(d, 0.25), size, hn::Set(d, 1.0))), hn::Mul(half, w.x),
                   hn::Mul(half, w.y), hn::Mul(half, w.z)});
   return is_good;
 }
 
-/// B divided by its largest entry, its Davenport matrix, and the quartic of the eigenvalues. `bound` >= <R, B> for
-/// every rotation.
-struct Scaled {
-  Matrix b;
-  Davenport k;
-};
-
-HWY_INLINE Scaled scaled(const Matrix& b, V bound, Quartic& quartic) {
+/// Divides B and an upper bound of <R, B> by the largest entry of B.
+HWY_INLINE void scale(Matrix& b, V& bound) {
   const D d;
   V size = hn::Zero(d);
   for (const auto& row : b.m) {
     for (const V& entry : row) size = hn::Max(size, hn::Abs(entry));
   }
-  const V scale = hn::Div(hn::Set(d, 1.0), size);
-  Scaled result;
-  V norm2 = hn::Zero(d);
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      result.b.m[i][j] = hn::Mul(scale, b.m[i][j]);
-      norm2 = hn::MulAdd(result.b.m[i][j], result.b.m[i][j], norm2);
-    }
+  const V over = hn::IfThenElseZero(hn::Gt(size, hn::Zero(d)), hn::Div(hn::Set(d, 1.0), size));
+  for (auto& row : b.m) {
+    for (V& entry : row) entry = hn::Mul(over, entry);
   }
-  result.k = davenport(result.b);
-  quartic = {hn::Mul(hn::Set(d, -2.0), norm2), hn::Mul(hn::Set(d, -8.0), determinant(result.b.m)),
-             determinant(minors(result.k)),
-             hn::Min(hn::Mul(scale, bound), hn::Sqrt(hn::Mul(hn::Set(d, 3.0), norm2)))};
-  return result;
+  bound = hn::Mul(over, bound);
 }
 
-/// The rotation for the largest eigenvalue x. False in lanes with an uncertain result.
-HWY_INLINE M rotation_at(const Scaled& s, V x, Matrix& rotation) {
-  const D d;
-  Davenport k = s.k;
-  k.k00 = hn::Sub(k.k00, x);
-  k.k11 = hn::Sub(k.k11, x);
-  k.k22 = hn::Sub(k.k22, x);
-  k.k33 = hn::Sub(k.k33, x);
-  Quaternion q = null_vector(k);
-  const V length2 = hn::MulAdd(q.w, q.w, dot({q.x, q.y, q.z}, {q.x, q.y, q.z}));
-  const V shorten = hn::Div(hn::Set(d, 1.0), hn::Sqrt(length2));
-  q = {hn::Mul(q.w, shorten), hn::Mul(q.x, shorten), hn::Mul(q.y, shorten), hn::Mul(q.z, shorten)};
-  const M is_good = hn::And(hn::Gt(length2, hn::Set(d, 1e-12)), polish(s.b, q));
-  rotation = rotation_of(q);
-  return is_good;
+#if HWY_MAX_BYTES >= 8 * 8 || HWY_TARGET == HWY_SCALAR  // kLanes doubles, or one
+/// Vector s of a block in single precision. `entry` returns vector v of the block in double precision.
+template <typename Entry>
+HWY_INLINE S single(std::size_t s, const Entry& entry) {
+  return hn::DemoteTo(SingleD(), entry(s));
 }
 
-/// The best rotations for B = sum_j w_ij (x_i - x_j) (p_i - p_j)^T; `bound` >= <R, B> for every rotation.
-/// False in lanes with an uncertain result.
-HWY_INLINE void fit(const Matrix (&b)[kVectors], const V (&bound)[kVectors], Matrix (&rotation)[kVectors],
-                    M (&is_good)[kVectors]) {
-  Scaled s[kVectors];
-  Quartic quartic[kVectors];
-  V x[kVectors];
-  for (std::size_t v = 0; v < kVectors; ++v) s[v] = scaled(b[v], bound[v], quartic[v]);
+/// Vector v of a block in double precision. `entry` returns vector s of the block in single precision.
+template <typename Entry>
+HWY_INLINE V widened(std::size_t v, const Entry& entry) {
+  return hn::PromoteTo(D(), entry(v));
+}
+#else
+template <typename Entry>
+HWY_INLINE S single(std::size_t s, const Entry& entry) {
+  const hn::Rebind<float, D> half;
+  return hn::Combine(SingleD(), hn::DemoteTo(half, entry(2 * s + 1)), hn::DemoteTo(half, entry(2 * s)));
+}
+
+template <typename Entry>
+HWY_INLINE V widened(std::size_t v, const Entry& entry) {
+  const hn::Rebind<float, D> half;
+  const S from = entry(v / 2);
+  return hn::PromoteTo(D(), v % 2 == 0 ? hn::LowerHalf(half, from) : hn::UpperHalf(half, from));
+}
+#endif
+
+/// The rotations of a block, as quaternions, to single precision. B and the bounds are scaled.
+HWY_INLINE void fit_roughly(const Matrix (&matrices)[kVectors], const V (&bounds)[kVectors],
+                            SingleQuaternion (&q)[kSingleVectors]) {
+  const SingleD d;
+  Davenport k[kSingleVectors];
+  Quartic quartic[kSingleVectors];
+  S x[kSingleVectors];
+  for (std::size_t s = 0; s < kSingleVectors; ++s) {
+    S b[3][3], norm2 = hn::Zero(d);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        b[i][j] = single(s, [&](std::size_t v) { return matrices[v].m[i][j]; });
+        norm2 = hn::MulAdd(b[i][j], b[i][j], norm2);
+      }
+    }
+    const S bound = single(s, [&](std::size_t v) { return bounds[v]; });
+    k[s] = davenport(b);
+    quartic[s] = {hn::Mul(hn::Set(d, -2.0F), norm2), hn::Mul(hn::Set(d, -8.0F), determinant(b)),
+                  determinant(minors(k[s])), hn::Min(bound, hn::Sqrt(hn::Mul(hn::Set(d, 3.0F), norm2)))};
+  }
   largest_roots(quartic, x);
-  for (std::size_t v = 0; v < kVectors; ++v) is_good[v] = rotation_at(s[v], x[v], rotation[v]);
+  for (std::size_t s = 0; s < kSingleVectors; ++s) {
+    k[s].k00 = hn::Sub(k[s].k00, x[s]);
+    k[s].k11 = hn::Sub(k[s].k11, x[s]);
+    k[s].k22 = hn::Sub(k[s].k22, x[s]);
+    k[s].k33 = hn::Sub(k[s].k33, x[s]);
+    q[s] = null_vector(k[s]);
+  }
+}
+
+/// The rotation near q, of length 1 to single precision. False in lanes with an uncertain result. A second step is for lanes in which
+/// B is nearly of rank 1, so that q is less precise.
+HWY_INLINE M polished(const Matrix& b, Quaternion q, Matrix& rotation) {
+  const D d;
+  const V one = hn::Set(d, 1.0);
+  const V excess = hn::Sub(hn::MulAdd(q.w, q.w, dot({q.x, q.y, q.z}, {q.x, q.y, q.z})), one);
+  const V lengthen =
+      hn::MulAdd(hn::MulAdd(hn::Set(d, 0.375), excess, hn::Set(d, -0.5)), excess, one);  // 1 / |q|
+  q = {hn::Mul(q.w, lengthen), hn::Mul(q.x, lengthen), hn::Mul(q.y, lengthen), hn::Mul(q.z, lengthen)};
+  const M is_near = polish(b, q);
+  rotation = rotation_of(q);
+  if (HWY_LIKELY(hn::AllTrue(d, is_near))) return is_near;
+  const M is_good = polish(b, q);
+  const Matrix again = rotation_of(q);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) rotation.m[i][j] = hn::IfThenElse(is_near, rotation.m[i][j], again.m[i][j]);
+  }
+  return hn::Or(is_near, is_good);
+}
+
+/// The best rotations for B = sum_j w_ij (x_i - x_j) (p_i - p_j)^T; `bound` >= <R, B> for every rotation. Scales both.
+/// False in lanes with an uncertain result.
+HWY_INLINE void fit(Matrix (&b)[kVectors], V (&bound)[kVectors], Matrix (&rotation)[kVectors],
+                    M (&is_good)[kVectors]) {
+  SingleQuaternion q[kSingleVectors];
+  for (std::size_t v = 0; v < kVectors; ++v) scale(b[v], bound[v]);
+  fit_roughly(b, bound, q);
+  for (std::size_t v = 0; v < kVectors; ++v) {
+    const Quaternion rough{
+        widened(v, [&](std::size_t k) { return q[k].w; }), widened(v, [&](std::size_t k) { return q[k].x; }),
+        widened(v, [&](std::size_t k) { return q[k].y; }), widened(v, [&](std::size_t k) { return q[k].z; })};
+    is_good[v] = polished(b[v], rough, rotation[v]);
+  }
 }
 
 }  // namespace lpdeform::HWY_NAMESPACE
