@@ -80,7 +80,7 @@ class CellPass {
   double bending(std::size_t i) const { return bending_[bending_.size() == 1 ? 0 : i]; }
 
   Field bending_ = Field::Ones(1);
-  mutable std::optional<Membrane> membrane_;          // if some b_i < 1
+  std::optional<Membrane> membrane_;                  // if some b_i < 1
   mutable std::vector<double> bent_c_, stretched_c_;  // b_i c_i and (1 - b_i) c_i, if some b_i < 1
   std::vector<double> rows_;                          // x, with fillers
   std::vector<double> c_;

@@ -28,7 +28,8 @@ Membrane::Membrane(std::shared_ptr<const RestShape> shape, const Workers& worker
                    const std::vector<char>& cells)
     : shape_(std::move(shape)),
       some_(faces_at(shape_->faces(), cells)),
-      faces_(static_cast<std::size_t>(corners().rows())) {
+      faces_(static_cast<std::size_t>(corners().rows())),
+      weights_(static_cast<std::size_t>(corners().rows())) {
   const Faces& faces = corners();
   const Points& rest = shape_->scaled_positions();
   const auto count = static_cast<std::size_t>(faces.rows());
@@ -71,11 +72,10 @@ double Membrane::share(std::int32_t i) const {
   return sum / 3;
 }
 
-void Membrane::add_gradient(const std::vector<double>& c, const Workers& workers, Points& result) {
+void Membrane::add_gradient(const std::vector<double>& c, const Workers& workers, Points& result) const {
   using Row = double __attribute__((vector_size(kRow * sizeof(double))));
   using SingleRow = float __attribute__((vector_size(kRow * sizeof(float)), aligned(sizeof(float))));
   const Faces& faces = corners();
-  weights_.resize(static_cast<std::size_t>(faces.rows()));
   workers.for_chunks(weights_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const auto row = static_cast<Eigen::Index>(t);
@@ -84,7 +84,7 @@ void Membrane::add_gradient(const std::vector<double>& c, const Workers& workers
   });
   const auto derivative = [&](std::size_t t, std::size_t corner) -> const SingleRow& {
     return *reinterpret_cast<const SingleRow*>(faces_.derivatives.data() +
-                                               MembraneFaces::derivative(t, corner));
+                                               MembraneFaces::place_of_derivative(t, corner));
   };
   workers.for_chunks(c.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {

@@ -29,7 +29,7 @@ class Membrane {
   /// A third of the sum of E_T^2 over the faces at vertex i. Of a vertex that is not marked, some faces may be missing.
   double share(std::int32_t i) const;
   /// Adds sum_T (c_a + c_b + c_c) / 3 dE_T^2/dx to `result`, (a, b, c) = T.
-  void add_gradient(const std::vector<double>& c, const Workers& workers, Points& result);
+  void add_gradient(const std::vector<double>& c, const Workers& workers, Points& result) const;
 
   std::size_t memory_bytes() const;
 
@@ -39,7 +39,7 @@ class Membrane {
   std::shared_ptr<const RestShape> shape_;
   std::optional<Faces> some_;  // the faces, unless it has all
   MembraneFaces faces_;
-  std::vector<double> weights_;                 // of each face, in add_gradient()
+  mutable std::vector<double> weights_;         // of each face, in add_gradient()
   std::vector<std::int32_t> offsets_, places_;  // of each vertex: 3 * face + corner
 };
 

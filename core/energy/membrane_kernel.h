@@ -21,10 +21,11 @@ struct MembraneFaces {
   std::vector<double> inverse[3];  // of the rest edges in the face's plane, upper triangular: 00, 01, 11
   std::vector<double> area;
   std::vector<double> squared;  // E_T^2
-  /// dE_T^2 in single precision: [face / kLanes][second or third corner][face % kLanes][axis, filler].
-  std::vector<float> derivatives;
-  /// Where that of the second corner of face t (`corner` 0) or of the third one (1) begins.
-  static std::size_t derivative(std::size_t t, std::size_t corner) {
+  std::vector<float>
+      derivatives;  // dE_T^2: [face / kLanes][second or third corner][face % kLanes][axis, filler]
+
+  /// Where in `derivatives` that of the second corner of face t (`corner` 0) or of the third one (1) begins.
+  static std::size_t place_of_derivative(std::size_t t, std::size_t corner) {
     return ((t / kLanes * 2 + corner) * kLanes + t % kLanes) * kRow;
   }
 };

@@ -212,7 +212,7 @@ struct SingleQuaternion {
 };
 
 /// The null vector of the singular matrix k, normalised: the column of its adjugate with the largest diagonal entry, which
-/// is its longest. Not finite if all columns are 0.
+/// is its longest. Not finite if all columns are 0, and not of length 1 if they are so short that their squares underflow.
 HWY_INLINE SingleQuaternion null_vector(const Davenport& k) {
   const Minors m = minors(k);
   const auto sum = [](S a, S b, S c, S d4, S e, S f) {  // a b - c d + e f
@@ -244,7 +244,8 @@ HWY_INLINE SingleQuaternion null_vector(const Davenport& k) {
   return {hn::Mul(q.w, shorten), hn::Mul(q.x, shorten), hn::Mul(q.y, shorten), hn::Mul(q.z, shorten)};
 }
 
-/// One Newton step for <R exp([w]x), B> at R = R(q). The error falls with its third power. False if R was not near the maximum.
+/// One Newton step for <R exp([w]x), B> at R = R(q), which changes q in any case. The error falls with its third power. False if the
+/// step was longer than kNear, or if R is not near the maximum.
 HWY_INLINE M polish(const Matrix& b, Quaternion& q) {
   const D d;
   const Matrix r = rotation_of(q);
@@ -281,14 +282,15 @@ HWY_INLINE M polish(const Matrix& b, Quaternion& q) {
   return is_good;
 }
 
-/// Divides B and an upper bound of <R, B> by the largest entry of B.
+/// Divides B and an upper bound of <R, B> by the largest entry of B, unless that is almost 0.
 HWY_INLINE void scale(Matrix& b, V& bound) {
   const D d;
   V size = hn::Zero(d);
   for (const auto& row : b.m) {
     for (const V& entry : row) size = hn::Max(size, hn::Abs(entry));
   }
-  const V over = hn::IfThenElseZero(hn::Gt(size, hn::Zero(d)), hn::Div(hn::Set(d, 1.0), size));
+  const V one = hn::Set(d, 1.0);
+  const V over = hn::IfThenElse(hn::Gt(size, hn::Set(d, 1e-300)), hn::Div(one, size), one);
   for (auto& row : b.m) {
     for (V& entry : row) entry = hn::Mul(over, entry);
   }
@@ -352,8 +354,8 @@ HWY_INLINE void fit_roughly(const Matrix (&matrices)[kVectors], const V (&bounds
   }
 }
 
-/// The rotation near q, of length 1 to single precision. False in lanes with an uncertain result. A second step is for lanes in which
-/// B is nearly of rank 1, so that q is less precise.
+/// The rotation near q. False in lanes with an uncertain result. q is of length 1 to single precision, or else a null vector of which
+/// the square underflowed. A second step is for lanes in which B is nearly of rank 1, so that q is less precise.
 HWY_INLINE M polished(const Matrix& b, Quaternion q, Matrix& rotation) {
   const D d;
   const V one = hn::Set(d, 1.0);
@@ -361,7 +363,8 @@ HWY_INLINE M polished(const Matrix& b, Quaternion q, Matrix& rotation) {
   const V lengthen =
       hn::MulAdd(hn::MulAdd(hn::Set(d, 0.375), excess, hn::Set(d, -0.5)), excess, one);  // 1 / |q|
   q = {hn::Mul(q.w, lengthen), hn::Mul(q.x, lengthen), hn::Mul(q.y, lengthen), hn::Mul(q.z, lengthen)};
-  const M is_near = polish(b, q);
+  const M is_unit = hn::Lt(hn::Abs(excess), hn::Set(d, 1e-5));
+  const M is_near = hn::And(is_unit, polish(b, q));
   rotation = rotation_of(q);
   if (HWY_LIKELY(hn::AllTrue(d, is_near))) return is_near;
   const M is_good = polish(b, q);
@@ -369,11 +372,11 @@ HWY_INLINE M polished(const Matrix& b, Quaternion q, Matrix& rotation) {
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) rotation.m[i][j] = hn::IfThenElse(is_near, rotation.m[i][j], again.m[i][j]);
   }
-  return hn::Or(is_near, is_good);
+  return hn::Or(is_near, hn::And(is_unit, is_good));
 }
 
 /// The best rotations for B = sum_j w_ij (x_i - x_j) (p_i - p_j)^T; `bound` >= <R, B> for every rotation. Scales both.
-/// False in lanes with an uncertain result.
+/// `is_good` is false in lanes with an uncertain result.
 HWY_INLINE void fit(Matrix (&b)[kVectors], V (&bound)[kVectors], Matrix (&rotation)[kVectors],
                     M (&is_good)[kVectors]) {
   SingleQuaternion q[kSingleVectors];

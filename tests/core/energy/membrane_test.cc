@@ -1,13 +1,16 @@
 #include "core/energy/membrane.h"
 
 #include <gtest/gtest.h>
+#include <hwy/highway.h>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "core/energy/cell_pass.h"
+#include "tests/core/instruction_sets.h"
 #include "tests/core/poses.h"
 
 namespace lpdeform {
@@ -40,8 +43,15 @@ double sum_of_shares(const Membrane& membrane, std::int32_t n) {
   return sum;
 }
 
-TEST(Membrane, IsWhatTheBestRotationOfEachFaceLeaves) {
-  const auto shape = rest_shape(box_surface(2, 2, 3));
+class MembraneKernel : public testing::TestWithParam<std::int64_t> {
+ protected:
+  MembraneKernel() { hwy::SetSupportedTargetsForTest(GetParam()); }
+  ~MembraneKernel() override { hwy::SetSupportedTargetsForTest(0); }
+};
+
+TEST_P(MembraneKernel, FindsWhatTheBestRotationOfEachFaceLeaves) {
+  const auto shape = rest_shape(grid(5, 7, 1));
+  ASSERT_NE(static_cast<std::size_t>(shape->faces().rows()) % MembraneFaces::kLanes, 0U);
   const Points& rest = shape->scaled_positions();
   const Points x = shaken(rest, 0.3);
   Membrane membrane(shape, Workers(1));
@@ -66,6 +76,32 @@ TEST(Membrane, IsWhatTheBestRotationOfEachFaceLeaves) {
   }
   EXPECT_NEAR(sum_of_shares(membrane, shape->vertex_count()), expected, 1e-10 * expected);
 }
+
+TEST_P(MembraneKernel, HasTheGradientOfItsEnergy) {
+  const auto shape = rest_shape(grid(5, 7, 1));
+  const Points x = shaken(shape->scaled_positions(), 0.3);
+  Membrane membrane(shape, Workers(1));
+  const auto energy = [&](const Points& at) {
+    membrane.evaluate(with_fillers(at).data(), Workers(1));
+    return sum_of_shares(membrane, shape->vertex_count());
+  };
+  const std::size_t before = membrane.memory_bytes();
+  energy(x);
+  Points gradient = Points::Zero(x.rows(), 3);
+  membrane.add_gradient(std::vector<double>(static_cast<std::size_t>(x.rows()), 1.0), Workers(1), gradient);
+  EXPECT_EQ(membrane.memory_bytes(), before);
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      Points there = x, here = x;
+      there(i, axis) += 1e-5;
+      here(i, axis) -= 1e-5;
+      EXPECT_NEAR(gradient(i, axis), (energy(there) - energy(here)) / 2e-5, 1e-5) << i << ", " << axis;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Targets, MembraneKernel, testing::ValuesIn(instruction_sets()),
+                         [](const auto& info) { return std::string(hwy::TargetName(info.param)); });
 
 TEST(Membrane, ResistsStretchingAsCellsDo) {
   const auto shape = rest_shape(box_surface(1, 12, 12));
