@@ -1,5 +1,5 @@
-// Fits the rotations of many cells at a time, one per lane: the method of rotation_fit.cc in vector instructions. All but the last
-// Newton step is in single precision.
+// Fits the rotations of many cells at a time, one per lane: the method of rotation_fit.cc in vector instructions. Rotations
+// are found in single precision. Newton steps in double precision make them exact.
 // cell_kernel.cc and membrane_kernel.cc include this file once for each instruction set, as Highway requires; hence this include guard.
 #if defined(LPDEFORM_ROTATION_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef LPDEFORM_ROTATION_LANES_INL_H

@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "core/energy/rotation_fit.h"
-#include "tests/core/instruction_sets.h"
+#include "tests/core/every_instruction_set.h"
 #include "tests/core/poses.h"
 
 namespace lpdeform {
@@ -17,11 +17,8 @@ namespace {
 
 constexpr std::size_t kLanes = CellBlocks::kLanes;
 
-class CellKernel : public testing::TestWithParam<std::int64_t> {
+class CellKernel : public EveryInstructionSet {
  protected:
-  CellKernel() { hwy::SetSupportedTargetsForTest(GetParam()); }
-  ~CellKernel() override { hwy::SetSupportedTargetsForTest(0); }
-
   /// Evaluates, and checks what comes out in every lane. `tolerance`: of E_i^2 over the cell's size.
   void expect_right(const RestShape& shape, const Points& x, double tolerance = 1e-14) {
     const CellBlocks blocks(shape, 64);
@@ -144,8 +141,7 @@ TEST_P(CellKernel, HoldsRotationsWhereTheyAreNotToBeFitted) {
   EXPECT_GT(sum, 1);  // the identity is not the best here
 }
 
-INSTANTIATE_TEST_SUITE_P(Targets, CellKernel, testing::ValuesIn(instruction_sets()),
-                         [](const auto& info) { return std::string(hwy::TargetName(info.param)); });
+INSTANTIATE_TEST_SUITE_P(Targets, CellKernel, testing::ValuesIn(instruction_sets()), by_its_name);
 
 }  // namespace
 }  // namespace lpdeform

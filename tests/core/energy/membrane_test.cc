@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/energy/cell_pass.h"
-#include "tests/core/instruction_sets.h"
+#include "tests/core/every_instruction_set.h"
 #include "tests/core/poses.h"
 
 namespace lpdeform {
@@ -43,11 +43,7 @@ double sum_of_shares(const Membrane& membrane, std::int32_t n) {
   return sum;
 }
 
-class MembraneKernel : public testing::TestWithParam<std::int64_t> {
- protected:
-  MembraneKernel() { hwy::SetSupportedTargetsForTest(GetParam()); }
-  ~MembraneKernel() override { hwy::SetSupportedTargetsForTest(0); }
-};
+class MembraneKernel : public EveryInstructionSet {};
 
 TEST_P(MembraneKernel, FindsWhatTheBestRotationOfEachFaceLeaves) {
   const auto shape = rest_shape(grid(5, 7, 1));
@@ -100,8 +96,7 @@ TEST_P(MembraneKernel, HasTheGradientOfItsEnergy) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Targets, MembraneKernel, testing::ValuesIn(instruction_sets()),
-                         [](const auto& info) { return std::string(hwy::TargetName(info.param)); });
+INSTANTIATE_TEST_SUITE_P(Targets, MembraneKernel, testing::ValuesIn(instruction_sets()), by_its_name);
 
 TEST(Membrane, ResistsStretchingAsCellsDo) {
   const auto shape = rest_shape(box_surface(1, 12, 12));

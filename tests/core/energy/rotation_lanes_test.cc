@@ -48,7 +48,7 @@ HWY_AFTER_NAMESPACE();
 #include <random>
 
 #include "core/energy/rotation_fit.h"
-#include "tests/core/instruction_sets.h"
+#include "tests/core/every_instruction_set.h"
 
 namespace lpdeform {
 
@@ -58,11 +58,8 @@ namespace {
 
 constexpr std::size_t kLanes = CellBlocks::kLanes;
 
-class RotationLanes : public testing::TestWithParam<std::int64_t> {
+class RotationLanes : public EveryInstructionSet {
  protected:
-  RotationLanes() { hwy::SetSupportedTargetsForTest(GetParam()); }
-  ~RotationLanes() override { hwy::SetSupportedTargetsForTest(0); }
-
   /// Fits all lanes to `b`, and checks those that are said to be good. Returns whether they are.
   static bool expect_right(const Eigen::Matrix3d& b, double bound) {
     double from[9 * kLanes], bounds[kLanes], to[9 * kLanes], good[kLanes];
@@ -126,8 +123,7 @@ TEST_P(RotationLanes, AreUncertainWhereThereIsNoBestRotation) {
   EXPECT_FALSE(expect_right(1e-310 * Eigen::Matrix3d::Identity(), 3e-310));
 }
 
-INSTANTIATE_TEST_SUITE_P(Targets, RotationLanes, testing::ValuesIn(instruction_sets()),
-                         [](const auto& info) { return std::string(hwy::TargetName(info.param)); });
+INSTANTIATE_TEST_SUITE_P(Targets, RotationLanes, testing::ValuesIn(instruction_sets()), by_its_name);
 
 }  // namespace
 }  // namespace lpdeform

@@ -12,15 +12,13 @@
 #include <string>
 #include <vector>
 
-#include "tests/core/instruction_sets.h"
+#include "tests/core/every_instruction_set.h"
 
 namespace lpdeform {
 namespace {
 
-class SolveKernel : public testing::TestWithParam<std::int64_t> {
+class SolveKernel : public EveryInstructionSet {
  protected:
-  SolveKernel() { hwy::SetSupportedTargetsForTest(GetParam()); }
-  ~SolveKernel() override { hwy::SetSupportedTargetsForTest(0); }
 };
 
 /// Two supernodes of a factor L: the first has rows in the second and behind it, the second only behind it.
@@ -122,8 +120,7 @@ TEST_P(SolveKernel, LeavesOtherSupernodesAlone) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Targets, SolveKernel, testing::ValuesIn(instruction_sets()),
-                         [](const auto& info) { return std::string(hwy::TargetName(info.param)); });
+INSTANTIATE_TEST_SUITE_P(Targets, SolveKernel, testing::ValuesIn(instruction_sets()), by_its_name);
 
 }  // namespace
 }  // namespace lpdeform

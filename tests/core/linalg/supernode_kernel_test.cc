@@ -11,17 +11,15 @@
 #include <string>
 #include <vector>
 
-#include "tests/core/instruction_sets.h"
+#include "tests/core/every_instruction_set.h"
 
 namespace lpdeform {
 namespace {
 
 using Matrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-class SupernodeKernel : public testing::TestWithParam<std::int64_t> {
+class SupernodeKernel : public EveryInstructionSet {
  protected:
-  SupernodeKernel() { hwy::SetSupportedTargetsForTest(GetParam()); }
-  ~SupernodeKernel() override { hwy::SetSupportedTargetsForTest(0); }
 };
 
 TEST_P(SupernodeKernel, SubtractsProductsAtTheirPlaces) {
@@ -82,8 +80,7 @@ TEST_P(SupernodeKernel, RefusesPivotsThatAreTooSmall) {
   EXPECT_FALSE(SolvingTriangle().factor(triangle.data(), 2, lowest.data()));
 }
 
-INSTANTIATE_TEST_SUITE_P(Targets, SupernodeKernel, testing::ValuesIn(instruction_sets()),
-                         [](const auto& info) { return std::string(hwy::TargetName(info.param)); });
+INSTANTIATE_TEST_SUITE_P(Targets, SupernodeKernel, testing::ValuesIn(instruction_sets()), by_its_name);
 
 }  // namespace
 }  // namespace lpdeform
