@@ -33,7 +33,7 @@ Keeper::Keeper(std::shared_ptr<Store> store, Services services)
 
 std::shared_ptr<Keeper> Keeper::create(std::shared_ptr<Store> store, Services services) {
   std::shared_ptr<Keeper> keeper(new Keeper(std::move(store), std::move(services)));
-  keeper->watch_unused();
+  keeper->sweep();
   keeper->watch_room();
   keeper->watch_calls();
   return keeper;

@@ -121,5 +121,34 @@ TEST_P(LookFromElsewhereTest, DoesNotEndADragThatRests) {
   EXPECT_TRUE(stream.history.ends.empty());
 }
 
+/// Redis hangs, as when its disk does: for longer than a lease, and for longer than servers wait for an answer.
+TEST_P(LookFromElsewhereTest, DoesNotEndADragThatRestsWhileRedisHangs) {
+  const auto session = create_by(GetParam());
+  DeformClient stream(*stub_, session);
+  ASSERT_TRUE(stream.send(ends_message(mesh_.vertices, 1, 1)));
+  ASSERT_TRUE(stream.settle(1).has_value());
+  const RedisStoreOptions usual;
+  for (const std::chrono::milliseconds hangs :
+       {usual.lease * 3 / 2, usual.lease * 3 / 2, usual.patience * 2}) {
+    redis_.pause();
+    std::thread resuming([&] {
+      std::this_thread::sleep_for(hangs);
+      redis_.resume();
+    });
+    v1::Session found;
+    ErrorDetails refusal;
+    const auto look = [&] { refusal = details_of(get_by("", *other_, session.session().name(), found)); };
+    look();
+    resuming.join();
+    const auto end = std::chrono::steady_clock::now() + kTestDeadline;
+    do look();
+    while (refusal.info.reason() == "STORE_FAILING" && std::chrono::steady_clock::now() < end);
+    EXPECT_EQ(refusal.info.reason(), "SESSION_ELSEWHERE");
+  }
+  ASSERT_TRUE(stream.send(tip_message(2, 1.5)));
+  EXPECT_TRUE(stream.settle(2).has_value());
+  EXPECT_TRUE(stream.history.ends.empty());
+}
+
 }  // namespace
 }  // namespace lpdeform

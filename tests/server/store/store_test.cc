@@ -356,13 +356,13 @@ class HandOverTest : public RedisStoreTest {
   }
 
   /// As if this moment had been so many milliseconds ago; negative: as if it came then.
-  void set_ago(const std::string& field, std::int64_t ms) {
+  void set_ago(const std::string& field, std::int64_t ms, const std::string& key = "lpdeform:s:a") {
     const auto time = redis().run({"TIME"});
     std::int64_t seconds = 0, microseconds = 0;
     ASSERT_TRUE(time.ok() && absl::SimpleAtoi(time->elements.at(0).text, &seconds) &&
                 absl::SimpleAtoi(time->elements.at(1).text, &microseconds));
     const std::string moment = absl::StrCat(1000 * seconds + microseconds / 1000 - ms);
-    ASSERT_TRUE(redis().run({"HSET", "lpdeform:s:a", field, moment}).ok());
+    ASSERT_TRUE(redis().run({"HSET", key, field, moment}).ok());
   }
   RedisConnection& redis() { return connection_; }
 
@@ -408,6 +408,61 @@ TEST_F(HandOverTest, OneThatIsBeingMadeIsHeldAndStays) {
   EXPECT_FALSE(is_wanted(*first_, true));
   EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
   EXPECT_FALSE(is_wanted(*first_));
+}
+
+/// Of a Redis that no server reaches for some time. A lease has an hour here.
+class OutageTest : public HandOverTest {
+ protected:
+  static constexpr std::int64_t kMinute = 60'000;
+
+  OutageTest() { EXPECT_TRUE(second_->touch({}).ok()); }
+  void reached_ago(std::int64_t minutes) { set_ago("at", minutes * kMinute, "lpdeform:time"); }
+  void back_ago(std::int64_t minutes) { set_ago("back", minutes * kMinute, "lpdeform:time"); }
+  void lease_ended_ago(std::int64_t minutes) {
+    set_ago("until", minutes * kMinute);
+    set_ago("alive", minutes * kMinute);
+  }
+};
+
+TEST_F(OutageTest, ALeaseThatEndsMeanwhileHoldsUntilItsHolderHadTimeToRenewIt) {
+  lease_ended_ago(10);
+  reached_ago(50);
+  EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
+  EXPECT_EQ(ask(*second_, "another way"), "SESSION_ELSEWHERE");
+  ASSERT_TRUE(second_->touch({}).ok());
+  EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
+  EXPECT_EQ(ask(*second_, "another way"), "SESSION_ELSEWHERE");
+  back_ago(55);
+  EXPECT_EQ(ask(*second_, "another way"), "SESSION_ELSEWHERE");
+  back_ago(61);
+  EXPECT_EQ(ask(*second_, "another way"), "");
+}
+
+TEST_F(OutageTest, ALeaseThatEndedBeforeHasEnded) {
+  reached_ago(50);
+  lease_ended_ago(51);
+  EXPECT_EQ(ask(*second_, "the way"), "");
+}
+
+TEST_F(OutageTest, AServerThatIsLateAloneHoldsNothing) {
+  lease_ended_ago(10);
+  reached_ago(39);  // by another one
+  EXPECT_EQ(ask(*second_, "the way"), "");
+}
+
+TEST_F(OutageTest, TwoInARowAreOne) {
+  reached_ago(200);
+  ASSERT_TRUE(second_->touch({}).ok());
+  lease_ended_ago(150);
+  back_ago(110);
+  reached_ago(60);
+  EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
+  ASSERT_TRUE(second_->touch({}).ok());
+  EXPECT_EQ(ask(*second_, "the way"), "SESSION_ELSEWHERE");
+  back_ago(130);
+  reached_ago(60);
+  ASSERT_TRUE(second_->touch({}).ok());  // a new one
+  EXPECT_EQ(ask(*second_, "the way"), "");
 }
 
 TEST_F(HandOverTest, WhoWantedItIsGivenItFirst) {
@@ -830,7 +885,8 @@ TEST_F(RedisStoreTest, WhatExpiresForOneThatHadItBeforeStaysWithTheOneThatHasIt)
 
 TEST_F(RedisStoreTest, WhatWasRemovedAsUnusedIsWrittenAgainOnlyByWhoHadItLast) {
   RedisKeys redis(redis_.port());
-  const auto cut_off = open(std::chrono::milliseconds(1)), other = open();
+  const std::chrono::milliseconds lease(100);
+  const auto cut_off = open(lease), other = open(lease);
   const std::vector<TouchedSession> used{{"a", 1, true, 0}};
   const StoredChange made = beginning("a");
   const auto go_unused = [&] {
@@ -843,8 +899,10 @@ TEST_F(RedisStoreTest, WhatWasRemovedAsUnusedIsWrittenAgainOnlyByWhoHadItLast) {
   EXPECT_EQ(cut_off->touch(used)->missing, std::vector<std::string>{"a"});
   EXPECT_EQ(*commit(*cut_off, recreated(next_of(made))), ChangeOutcome::kKept);
   absl::StatusOr<StoredSession> taken;
-  do taken = other->take_over("a", "anna");
-  while (!taken.ok());
+  do {  // its lease ends only while servers reach Redis
+    ASSERT_TRUE(other->touch(kNone).ok());
+    taken = other->take_over("a", "anna");
+  } while (!taken.ok());
   go_unused();
   EXPECT_EQ(cut_off->touch(used)->lost, std::vector<std::string>{"a"});
   EXPECT_EQ(*commit(*cut_off, recreated(next_of(made))), ChangeOutcome::kFenced);
