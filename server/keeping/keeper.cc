@@ -33,7 +33,9 @@ Keeper::Keeper(std::shared_ptr<Store> store, Services services)
 
 std::shared_ptr<Keeper> Keeper::create(std::shared_ptr<Store> store, Services services) {
   std::shared_ptr<Keeper> keeper(new Keeper(std::move(store), std::move(services)));
-  keeper->sweep();
+  keeper->watch_unused();
+  // The first touch is made at once: an outage of the store ends when a server starts.
+  static_cast<void>(keeper->toucher_.try_post([one = keeper.get()] { one->touch_all(); }));
   keeper->watch_room();
   keeper->watch_calls();
   return keeper;

@@ -21,26 +21,30 @@ inline const std::string kNow =
 /// is dated by it.
 inline const std::string kRan = "local ran = tonumber(redis.call('HGET', 'lpdeform:time', 'ran') or '0'); ";
 
-/// A function: when the last outage began and when it ended, or 0 and 0. In an outage no server reaches Redis
-/// for two of the three calls of kTick that a lease has room for: Redis hangs, or its disk, or no server runs.
-/// An outage that begins within a lease of the one before continues that one. Argument: the lease.
+/// A function: the last outage. In an outage no server calls kTick for more than two thirds of a lease: Redis or its
+/// disk hangs, or no server runs. Argument: the lease. Returns `away` and `back`, the times of the last call before it
+/// and of the first one after it (now, as long as it lasts), and `first`. Outages that begin less than two leases after
+/// the end of another are one, with its `away`; `first` is when the first of them ended. 0, 0, 0 if there was none.
 inline const std::string kOutage =
     "local function outage(lease) "
-    "  local has = redis.call('HMGET', 'lpdeform:time', 'at', 'away', 'back'); "
-    "  local at, away, back = tonumber(has[1] or now), tonumber(has[2] or 0), tonumber(has[3] or 0); "
-    "  if now - at <= 2 * lease / 3 then return away, back end "
-    "  return at - back < lease and away or at, now "
+    "  local has = redis.call('HMGET', 'lpdeform:time', 'at', 'away', 'back', 'first'); "
+    "  local at, away = tonumber(has[1] or now), tonumber(has[2] or 0); "
+    "  local back, first = tonumber(has[3] or 0), tonumber(has[4] or 0); "
+    "  if now - at <= 2 * lease / 3 then return away, back, first end "
+    "  if first <= at and at - first < 2 * lease then return away, now, first end "
+    "  return at, now, now "
     "end ";
 
-/// Called by each server three times a lease. Advances `ran` and returns it. No keys. ARGV: the lease, which is
-/// also the longest time between two calls that counts; during a longer one no server ran, or none reached
+/// Advances `ran` and returns it. Each server calls it a third of a lease after its last call was answered. No keys. ARGV: the
+/// lease, which is also the longest time between two calls that counts; during a longer one no server ran, or none reached
 /// Redis.
 inline const std::string kTick =
     kAlways + kNow + kRan + kOutage +
     "local step = now - tonumber(redis.call('HGET', 'lpdeform:time', 'at') or now); "
     "step = math.max(0, math.min(step, tonumber(ARGV[1]))); "
-    "local away, back = outage(tonumber(ARGV[1])); "
-    "redis.call('HSET', 'lpdeform:time', 'at', now, 'ran', ran + step, 'away', away, 'back', back); "
+    "local away, back, first = outage(tonumber(ARGV[1])); "
+    "redis.call('HSET', 'lpdeform:time', 'at', now, 'ran', ran + step, 'away', away, 'back', back, 'first', "
+    "first); "
     "return ran + step";
 
 inline const std::string kUsed = kRan + "redis.call('ZADD', 'lpdeform:used', ran, KEYS[1]); ";
@@ -172,7 +176,7 @@ inline const std::string kWanted = "1000";
 /// hash, in the new epoch. Fields of the hash: `until`: end of the lease while it is in use; `alive`: end of
 /// the lease while its holder lives; `since`: when it was taken over; `stays`: for how long at least it stays
 /// with its holder. A lease that ended during an outage counts for one lease after it, so that its holder can
-/// renew it.
+/// renew it. For that time no holder counts as gone, since it may have to connect again.
 inline const std::string kTakeOver =
     kAlways + kNow + kIsGone + kOutage +
     "local has = redis.call('HMGET', KEYS[1], 'holder', 'owner', 'route', 'wanter'); "
@@ -180,13 +184,14 @@ inline const std::string kTakeOver =
     "local function number(field) return tonumber(redis.call('HGET', KEYS[1], field) or '0') end "
     "local route, stays = has[3] or '', math.max(number('stays'), tonumber(ARGV[5])); "
     "local away, back = outage(tonumber(ARGV[3])); "
+    "local is_just_back = back <= now and now - back < tonumber(ARGV[3]); "
     "local function is_leased(field) "
-    "  return number(field) > (now - back < tonumber(ARGV[3]) and away or now) "
+    "  return number(field) > (is_just_back and math.min(away, now) or now) "
     "end "
     "local is_wanted = now - number('wanted') < " +
     kWanted +
     "; "
-    "if has[1] ~= ARGV[1] and not is_gone(has[1]) then "
+    "if has[1] ~= ARGV[1] and (is_just_back or not is_gone(has[1])) then "
     "  local is_misrouted = route ~= '' and ARGV[4] ~= route; "
     "  if is_leased('until') or (is_misrouted and is_leased('alive')) then "
     "    if route ~= '' and route == ARGV[4] and now - number('since') > stays and "

@@ -32,8 +32,8 @@ struct RedisStoreOptions {
 /// ended, and its sessions are free at once. If a server is stopped or cut off without Redis knowing, its
 /// sessions are free when the lease ends. A server that lost only its connection may be taken for ended; it
 /// is then fenced like any other. A user of Redis who may not SUBSCRIBE holds sessions by the lease alone.
-/// If no server reaches Redis for two thirds of a lease, as when Redis or its disk hangs, leases that end
-/// meanwhile hold for one lease after that, so that nobody takes a session from a holder that could not renew
+/// If no server reaches Redis for two thirds of a lease, as when Redis or its disk hangs, leases that end meanwhile hold for one
+/// lease after that, also where a holder has lost its connection. So nobody takes a session from a holder that could not renew
 /// its lease.
 ///
 /// If several servers want a session for callers of its route, the first of them gets it. If two servers want
@@ -53,7 +53,7 @@ struct RedisStoreOptions {
 /// blob; lpdeform:m:SESSION, for a session that is being made, the set of its blobs' keys;
 /// lpdeform:r:OWNER:REQUEST, a session's name; lpdeform:o:OWNER, the sorted set of an owner's sessions;
 /// lpdeform:used, the sorted set of all sessions by their last use; lpdeform:time, the clock of servers'
-/// running time; lpdeform:gone, the sorted set of removed sessions, by when they were removed;
+/// running time, and the last outage; lpdeform:gone, the sorted set of removed sessions, by when they were removed;
 /// lpdeform:gone:epochs, a hash of those that may be written again. Channel: lpdeform:h:HOLDER. Redis 7.0 or
 /// later.
 ///
