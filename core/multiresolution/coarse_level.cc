@@ -36,7 +36,7 @@ double at(const Field& field, Eigen::Index i) {
 }  // namespace
 
 CoarseMesh CoarseLevel::coarsened(const RestShape& fine) {
-  return coarsen({fine.positions(), fine.faces()}, fine.vertex_count() / kRatio);
+  return coarsen({fine.positions(), fine.faces()}, fine.vertex_count() / ratio_of(fine.vertex_count()));
 }
 
 std::unique_ptr<CoarseLevel> CoarseLevel::create(const RestShape& fine, CoarseMesh coarse,
@@ -47,6 +47,7 @@ std::unique_ptr<CoarseLevel> CoarseLevel::create(const RestShape& fine, CoarseMe
   std::unique_ptr<LevelSolver> solver = make_solver(*shape);
   if (!solver) return nullptr;
   std::unique_ptr<CoarseLevel> level(new CoarseLevel);
+  level->ratio_ = ratio_of(fine.vertex_count());
   level->fine_vertex_ = std::move(coarse.fine_vertex);
   level->coarse_vertex_ = std::move(coarse.coarse_vertex);
   level->share_.assign(level->fine_vertex_.size(), 0.0);
