@@ -30,13 +30,14 @@ struct CoarseMotion {
   std::vector<Turn> turns;  // of each vertex; blends of rotations
 };
 
-/// A coarse level: a shape with a sixth of the fine shape's vertices, or a tenth of a large one's, a solver of its own, and the restriction and
-/// prolongation between the two levels. This is the "subspace technique" of the paper's future work. Its result is only
-/// an initial guess for the fine level, never a final result. One caller at a time.
+/// A coarse level: a shape with a sixth of the fine shape's vertices, or a tenth of a large one's, a solver of its own,
+/// and the restriction and prolongation between the two levels. This is the "subspace technique" of the paper's future
+/// work. Its result is only an initial guess for the fine level, never a final result.
+/// One caller at a time.
 class CoarseLevel {
  public:
-  /// Vertices of the fine shape over those of its coarse level, up to 30,000 vertices and from there on.
-  static constexpr std::int32_t kRatio = 6, kRatioOfLarge = 10;
+  /// Vertices of the fine shape over those of its coarse level, below kLarge vertices and from there on.
+  static constexpr std::int32_t kRatio = 6, kRatioOfLarge = 10, kLarge = 60000;
 
   /// The mesh of the coarse level of `fine`.
   static CoarseMesh coarsened(const RestShape& fine);
@@ -48,7 +49,7 @@ class CoarseLevel {
 
   /// Restricts the inputs of the fine level to the coarse solver: coarse_handles, and the material. A coarse cell stands
   /// for m fine cells, and its E_i^2 is a sum over them. If p_i is not 2, s_i is therefore multiplied by (m /
-  /// ratio)^(1 - p_i / 2) and clamped to the permitted range. The coarse cells get the bending of the fine cells.
+  /// ratio_)^(1 - p_i / 2) and clamped to the permitted range. The coarse cells get the bending of the fine cells.
   absl::Status take_over(const FineInputs& fine);
 
   /// Whether a coarse level of this shape should lead in a drag: see lead().
@@ -103,7 +104,7 @@ class CoarseLevel {
 
   CoarseLevel() = default;
   static std::int32_t ratio_of(std::int32_t fine_vertices) {
-    return fine_vertices < kLeastEased ? kRatio : kRatioOfLarge;
+    return fine_vertices < kLarge ? kRatio : kRatioOfLarge;
   }
   void find_guides(const RestShape& fine);
   absl::Status restrict_inputs(const FineInputs& fine);

@@ -20,7 +20,8 @@ constexpr std::size_t kWorkspace = QuasiNewton::kBytesPerVertex, kWorkspaceOfLev
 // What a Deformer holds of each vertex besides: x, positions, x_before_move, energies and weights.
 constexpr std::size_t kStates = 12 * sizeof(double);
 constexpr std::size_t kCellBytes = 60, kEdgeBytes = 30;  // of CellPass: per vertex, per directed edge
-constexpr std::size_t kCoarseShare = 4;                  // the coarse levels take about 1 / kCoarseShare more
+// The coarse levels take about 1 / kCoarseShare more; of a fine shape of CoarseLevel::kLarge vertices or more, 1 / kCoarseShareOfLarge.
+constexpr std::size_t kCoarseShare = 4, kCoarseShareOfLarge = 6;
 constexpr std::int32_t kCoarsenBeforehand = 10000;  // vertices from which on cold solves have a coarse level
 
 /// Memory of a Deformer without its metric.
@@ -58,7 +59,8 @@ absl::StatusOr<std::unique_ptr<Deformer>> Deformer::create(std::shared_ptr<const
     if (!options.admit) return absl::OkStatus();
     const std::size_t own = metric_bytes + bytes_beside_metric(*shape);
     const bool has_coarse = shape->vertex_count() >= kCoarsenBeforehand;
-    std::size_t with_levels = has_coarse ? own + own / kCoarseShare : own;
+    const bool is_large = shape->vertex_count() >= CoarseLevel::kLarge;
+    std::size_t with_levels = has_coarse ? own + own / (is_large ? kCoarseShareOfLarge : kCoarseShare) : own;
     if (shape->vertex_count() >= options.graded_from) with_levels += bytes_of_graded_level(*shape, own);
     return options.admit(with_levels);
   };

@@ -21,7 +21,7 @@ inline const std::string kNow =
 /// is dated by it.
 inline const std::string kRan = "local ran = tonumber(redis.call('HGET', 'lpdeform:time', 'ran') or '0'); ";
 
-/// A function: the last outage. In an outage no server calls kTick for more than two thirds of a lease: Redis or its
+/// A function: the last outage. In an outage no server calls kTick for more than half of a lease: Redis or its
 /// disk hangs, or no server runs. Argument: the lease. Returns `away` and `back`, the times of the last call before it
 /// and of the first one after it (now, as long as it lasts), and `first`. Outages that begin less than two leases after
 /// the end of another are one, with its `away`; `first` is when the first of them ended. 0, 0, 0 if there was none.
@@ -30,7 +30,7 @@ inline const std::string kOutage =
     "  local has = redis.call('HMGET', 'lpdeform:time', 'at', 'away', 'back', 'first'); "
     "  local at, away = tonumber(has[1] or now), tonumber(has[2] or 0); "
     "  local back, first = tonumber(has[3] or 0), tonumber(has[4] or 0); "
-    "  if now - at <= 2 * lease / 3 then return away, back, first end "
+    "  if now - at <= lease / 2 then return away, back, first end "
     "  if first <= at and at - first < 2 * lease then return away, now, first end "
     "  return at, now, now "
     "end ";
@@ -186,7 +186,7 @@ inline const std::string kTakeOver =
     "local away, back = outage(tonumber(ARGV[3])); "
     "local is_just_back = back <= now and now - back < tonumber(ARGV[3]); "
     "local function is_leased(field) "
-    "  return number(field) > (is_just_back and math.min(away, now) or now) "
+    "  return number(field) > (is_just_back and away or now) "
     "end "
     "local is_wanted = now - number('wanted') < " +
     kWanted +

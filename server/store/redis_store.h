@@ -32,9 +32,9 @@ struct RedisStoreOptions {
 /// ended, and its sessions are free at once. If a server is stopped or cut off without Redis knowing, its
 /// sessions are free when the lease ends. A server that lost only its connection may be taken for ended; it
 /// is then fenced like any other. A user of Redis who may not SUBSCRIBE holds sessions by the lease alone.
-/// If no server reaches Redis for two thirds of a lease, as when Redis or its disk hangs, leases that end meanwhile hold for one
-/// lease after that, also where a holder has lost its connection. So nobody takes a session from a holder that could not renew
-/// its lease.
+/// If no server reaches Redis for half of a lease, as when Redis or its disk hangs, leases that end meanwhile hold for one lease
+/// after that, also where a holder has lost its connection. So a holder keeps its sessions through an outage, or through several
+/// that begin within two leases after the end of the first. Where Redis is slow for longer, others may take them over.
 ///
 /// If several servers want a session for callers of its route, the first of them gets it. If two servers want
 /// it from each other in turn, as behind proxies that know different sets of servers, it stays twice as long

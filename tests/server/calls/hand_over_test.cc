@@ -121,7 +121,7 @@ TEST_P(LookFromElsewhereTest, DoesNotEndADragThatRests) {
   EXPECT_TRUE(stream.history.ends.empty());
 }
 
-/// Redis hangs, as when its disk does: for longer than a lease, and until servers have given a call up and connect again.
+/// Redis hangs, as when its disk does: for longer than a lease, and for longer than servers wait for an answer.
 TEST_P(LookFromElsewhereTest, DoesNotEndADragThatRestsWhileRedisHangs) {
   const auto session = create_by(GetParam());
   DeformClient stream(*stub_, session);
