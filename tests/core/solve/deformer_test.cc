@@ -324,8 +324,13 @@ TEST(Deformer, AsksBeforeItTakesMemory) {
   }
 }
 
-TEST(Deformer, AsksForItsCoarseLevelsToo) {
-  const int side = 180;
+/// Of a mesh whose coarse level has a sixth of its vertices, and of one with a tenth.
+class DeformerOfSide : public testing::TestWithParam<int> {};
+
+INSTANTIATE_TEST_SUITE_P(SixthAndTenth, DeformerOfSide, testing::Values(180, 260));
+
+TEST_P(DeformerOfSide, AsksForItsCoarseLevelsToo) {
+  const int side = GetParam();
   const TriangleMesh mesh = grid(side, side, 2);
   const auto shape = rest_shape(mesh);
   std::size_t asked = 0;
