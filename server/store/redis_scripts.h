@@ -24,7 +24,7 @@ inline const std::string kRan = "local ran = tonumber(redis.call('HGET', 'lpdefo
 /// A function: the last outage. In an outage no server calls kTick for more than half of a lease: Redis or its
 /// disk hangs, or no server runs. Argument: the lease. Returns `away` and `back`, the times of the last call before it
 /// and of the first one after it (now, as long as it lasts), and `first`. Outages that begin less than two leases after
-/// the end of another are one, with its `away`; `first` is when the first of them ended. 0, 0, 0 if there was none.
+/// `first`, when the first of them ended, count as one, with the `away` of the first. 0, 0, 0 if there was none.
 inline const std::string kOutage =
     "local function outage(lease) "
     "  local has = redis.call('HMGET', 'lpdeform:time', 'at', 'away', 'back', 'first'); "
