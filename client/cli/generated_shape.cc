@@ -1,6 +1,9 @@
 #include "client/cli/generated_shape.h"
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
+#include <iterator>
 #include <numbers>
 #include <utility>
 
@@ -17,8 +20,16 @@ namespace {
 
 using Point = Eigen::RowVector3d;
 
-constexpr int kMostDetail = 32;
+constexpr int kMostVertices = 5'000'000;
 constexpr double kHalfCell = 0.5;
+
+/// A shape of a given number of vertices is made again, at most so often, until it is as close as this.
+constexpr int kRounds = 2;
+constexpr double kCloseEnough = 0.05;
+
+int cells(double count) {
+  return static_cast<int>(std::lround(count));
+}
 
 double radians(double degrees) {
   return degrees * std::numbers::pi / 180;
@@ -37,7 +48,7 @@ void hold(GeneratedShape& shape, const char* name, const std::function<bool(cons
 
 /// Makes one of the paper's poses with a function of core/shapes/paper_poses.h.
 template <PaperPose (*make)(double size)>
-GeneratedShape paper_shape(int detail) {
+GeneratedShape paper_shape(double detail) {
   PaperPose pose = make(detail);
   GeneratedShape shape{std::move(pose.mesh), {}, std::move(pose.note)};
   for (const auto& [name, handle] : pose.handles.handles()) {
@@ -47,33 +58,35 @@ GeneratedShape paper_shape(int detail) {
   return shape;
 }
 
-GeneratedShape block(int detail) {
-  const double length = 28.0 * detail;
-  GeneratedShape shape{
-      block_with_holes(28 * detail, 12 * detail, 8 * detail), {}, "one end stays, the other is pulled"};
+GeneratedShape block(double detail) {
+  const int length = cells(28 * detail);
+  GeneratedShape shape{block_with_holes(length, cells(12 * detail), cells(8 * detail)),
+                       {},
+                       "one end stays, the other is pulled"};
   hold(shape, "fixed", [](const Point& p) { return p.x() < kHalfCell; });
   hold(
       shape, "end", [=](const Point& p) { return p.x() > length - kHalfCell; },
-      client::RigidMotion{.translation = {length / 2, 0, 0}});
+      client::RigidMotion{.translation = {length / 2.0, 0, 0}});
   return shape;
 }
 
-GeneratedShape bumpy_grid(int detail) {
-  const double side = 40.0 * detail, middle = side / 2;
-  GeneratedShape shape{
-      grid(40 * detail, 40 * detail, 2.0 * detail), {}, "the rim stays, the middle is lifted"};
+GeneratedShape bumpy_grid(double detail) {
+  const int side = cells(40 * detail);
+  const double middle = side / 2.0;
+  GeneratedShape shape{grid(side, side, 2 * detail), {}, "the rim stays, the middle is lifted"};
   hold(shape, "rim", [=](const Point& p) {
     const double from_middle = std::max(std::abs(p.x() - middle), std::abs(p.y() - middle));
     return from_middle > middle - kHalfCell;
   });
   hold(
-      shape, "middle", [=](const Point& p) { return std::hypot(p.x() - middle, p.y() - middle) < side / 10; },
+      shape, "middle",
+      [=](const Point& p) { return std::hypot(p.x() - middle, p.y() - middle) < side / 10.0; },
       client::RigidMotion{.translation = {0, 0, 0.4 * side}});
   return shape;
 }
 
-GeneratedShape ball(int detail) {
-  GeneratedShape shape{sphere(3 + detail), {}, "the bottom stays, the top is pulled up and turned"};
+GeneratedShape ball(double detail) {
+  GeneratedShape shape{sphere(3 + cells(detail)), {}, "the bottom stays, the top is pulled up and turned"};
   hold(shape, "bottom", [](const Point& p) { return p.z() < -0.9; });
   hold(
       shape, "top", [](const Point& p) { return p.z() > 0.9; },
@@ -81,7 +94,7 @@ GeneratedShape ball(int detail) {
   return shape;
 }
 
-GeneratedShape animal(int detail) {
+GeneratedShape animal(double detail) {
   GeneratedShape shape = paper_shape<paper_creature>(detail);
   shape.note += ", the tail is raised";
   hold(
@@ -93,23 +106,24 @@ GeneratedShape animal(int detail) {
   return shape;
 }
 
-GeneratedShape neck(int detail) {
-  const double length = 42.0 * detail, middle = length / 2, side = 8.0 * detail;
-  GeneratedShape shape{necked_bar(8 * detail, 42 * detail, 4 * detail, 6 * detail),
+GeneratedShape neck(double detail) {
+  const int side = 2 * cells(4 * detail), length = cells(42 * detail);
+  const double middle = length / 2.0;
+  GeneratedShape shape{necked_bar(side, length, 2 * cells(2 * detail), cells(6 * detail)),
                        {},
                        "one end stays, the other is bent by 60 degrees"};
   hold(shape, "bottom", [](const Point& p) { return p.z() < kHalfCell; });
   hold(
       shape, "top", [=](const Point& p) { return p.z() > length - kHalfCell; },
       client::RigidMotion{
-          .axis = {1, 0, 0}, .angle_radians = radians(60), .center = {side / 2, side / 2, middle}});
+          .axis = {1, 0, 0}, .angle_radians = radians(60), .center = {side / 2.0, side / 2.0, middle}});
   return shape;
 }
 
 /// Holds the lowest twentieth of a shape, and turns and moves the highest.
 template <TriangleMesh (*make)(int resolution), int kResolution>
-GeneratedShape bent_over(int detail) {
-  GeneratedShape shape{make(kResolution * detail), {}, "the foot stays, the top is bent over"};
+GeneratedShape bent_over(double detail) {
+  GeneratedShape shape{make(cells(kResolution * detail)), {}, "the foot stays, the top is bent over"};
   const Point low = shape.mesh.vertices.colwise().minCoeff(), high = shape.mesh.vertices.colwise().maxCoeff();
   const double height = high.z() - low.z();
   hold(shape, "foot", [=](const Point& p) { return p.z() < low.z() + 0.05 * height; });
@@ -122,36 +136,66 @@ GeneratedShape bent_over(int detail) {
 
 struct Entry {
   const char* name;
-  GeneratedShape (*make)(int detail);
+  GeneratedShape (*make)(double detail);
   int most_detail;
 };
 
-constexpr Entry kShapes[] = {{"bar", paper_shape<paper_bar>, kMostDetail},
-                             {"sheet", paper_shape<paper_sheet>, kMostDetail / 2},
-                             {"block", block, kMostDetail / 2},
+constexpr Entry kShapes[] = {{"bar", paper_shape<paper_bar>, 32},
+                             {"sheet", paper_shape<paper_sheet>, 16},
+                             {"block", block, 16},
                              {"pierced_block", paper_shape<paper_block>, 6},
-                             {"grid", bumpy_grid, kMostDetail},
+                             {"grid", bumpy_grid, 32},
                              {"sphere", ball, 6},
                              {"creature", animal, 6},
                              {"arm", paper_shape<paper_arm>, 6},
-                             {"neck", neck, kMostDetail / 2},
-                             {"scan", bent_over<scan, 48>, kMostDetail / 2},
-                             {"tree", bent_over<tube_tree, 80>, kMostDetail / 2}};
+                             {"neck", neck, 16},
+                             {"scan", bent_over<scan, 48>, 16},
+                             {"tree", bent_over<tube_tree, 80>, 16}};
+
+absl::StatusOr<const Entry*> entry_of(std::string_view name) {
+  const auto found = std::ranges::find(kShapes, name, &Entry::name);
+  if (found != std::end(kShapes)) return found;
+  return make_fault({Reason::kShapeUnknown, std::string(name), ""},
+                    absl::StrCat("There is no shape \"", std::string(name), "\"; there are ",
+                                 absl::StrJoin(generated_shape_names(), ", "), "."));
+}
+
+/// The detail at which a shape has about `ratio` times the vertices that it has at `from`.
+double detail_for(const Entry& entry, double from, double ratio) {
+  return entry.make == ball ? from + std::round(std::log2(ratio) / 2) : from * std::sqrt(ratio);
+}
 
 }  // namespace
 
 absl::StatusOr<GeneratedShape> generate_shape(std::string_view name, int detail) {
-  for (const Entry& entry : kShapes) {
-    if (name != entry.name) continue;
-    if (detail >= 1 && detail <= entry.most_detail) return entry.make(detail);
-    const std::string limit = absl::StrCat("1 <= detail <= ", entry.most_detail);
-    return make_fault(
-        {Reason::kShapeDetail, "", limit},
-        absl::StrCat("Detail ", detail, " is not in 1 to ", entry.most_detail, " of the ", entry.name, "."));
+  const absl::StatusOr<const Entry*> entry = entry_of(name);
+  if (!entry.ok()) return entry.status();
+  const int most = (*entry)->most_detail;
+  if (detail >= 1 && detail <= most) return (*entry)->make(detail);
+  return make_fault(
+      {Reason::kShapeDetail, "", absl::StrCat("1 <= detail <= ", most)},
+      absl::StrCat("Detail ", detail, " is not in 1 to ", most, " of the ", (*entry)->name, "."));
+}
+
+absl::StatusOr<GeneratedShape> generate_shape_of(std::string_view name, int vertices) {
+  const absl::StatusOr<const Entry*> entry = entry_of(name);
+  if (!entry.ok()) return entry.status();
+  GeneratedShape shape = (*entry)->make(1);
+  const auto least = shape.mesh.vertices.rows();
+  if (vertices < least || vertices > kMostVertices)
+    return make_fault({Reason::kShapeDetail, "", absl::StrCat(least, " <= vertices <= ", kMostVertices)},
+                      absl::StrCat("The ", (*entry)->name, " has ", least, " to ", kMostVertices,
+                                   " vertices, not ", vertices, "."));
+  double detail = 1;
+  for (int round = 0; round < kRounds; ++round) {
+    const double ratio = vertices / static_cast<double>(shape.mesh.vertices.rows());
+    if (std::abs(ratio - 1) < kCloseEnough) break;
+    const double next = std::max(1.0, detail_for(**entry, detail, ratio));
+    if (next == detail) break;
+    detail = next;
+    shape = (*entry)->make(detail);
   }
-  return make_fault({Reason::kShapeUnknown, std::string(name), ""},
-                    absl::StrCat("There is no shape \"", std::string(name), "\"; there are ",
-                                 absl::StrJoin(generated_shape_names(), ", "), "."));
+  return shape;
 }
 
 std::vector<std::string> generated_shape_names() {

@@ -384,7 +384,12 @@ void add_shape(CLI::App& program, std::function<ExitStatus()>& command) {
       ->required()
       ->check(CLI::IsMember(names))
       ->option_text(" ");
-  app.add_option("--detail", options->detail, "Multiplies the cells along each side (1)")->option_text("N");
+  CLI::Option* const detail =
+      app.add_option("--detail", options->detail, "Multiplies the cells along each side (1)")
+          ->option_text("N");
+  app.add_option("--vertices", options->vertices, "About how many vertices, up to 5 million")
+      ->option_text("N")
+      ->excludes(detail);
   app.add_option("--out", options->out,
                  "Where to write the mesh: .off, .obj, .ply, or a picture as .png; required")
       ->required()

@@ -17,7 +17,9 @@ absl::Status write_shape(const ShapeOptions& options) {
     status = check_apart(std::array{NamedFile{"--handles", *options.handles}},
                          std::array{NamedFile{"--out", options.out}});
   if (!status.ok()) return status;
-  const absl::StatusOr<GeneratedShape> shape = generate_shape(options.name, options.detail);
+  const absl::StatusOr<GeneratedShape> shape = options.vertices
+                                                   ? generate_shape_of(options.name, *options.vertices)
+                                                   : generate_shape(options.name, options.detail);
   if (!shape.ok()) return shape.status();
   status = write_output(options.out, {{shape->mesh, ""}, {}}, shape->mesh.vertices, {}, {});
   if (!status.ok()) return status;

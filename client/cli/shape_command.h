@@ -12,6 +12,7 @@ namespace lpdeform::cli {
 struct ShapeOptions {
   std::string name;
   int detail = 1;
+  std::optional<int> vertices;  // in place of detail
   std::filesystem::path out;
   std::optional<std::filesystem::path> handles;
 };

@@ -2,7 +2,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -21,10 +23,15 @@ constexpr std::array<std::array<int, 4>, 6> kTetrahedra{
 class Marcher {
  public:
   Marcher(const ImplicitField& field, const SampleGrid& grid)
-      : grid_(grid), step_y_(grid.cells[0] + 1), step_z_(step_y_ * (grid.cells[1] + 1)) {
-    values_.reserve(step_z_ * (grid.cells[2] + 1));
-    for (std::int64_t sample = 0; sample < step_z_ * (grid.cells[2] + 1); ++sample) {
-      values_.push_back(field(position(sample)));
+      : field_(field),
+        grid_(grid),
+        step_y_(grid.cells[0] + 1),
+        step_z_(step_y_ * (grid.cells[1] + 1)),
+        is_inside_(step_z_ * (grid.cells[2] + 1)) {
+    for (int z = 0; z <= grid.cells[2]; z += kBlock) {
+      for (int y = 0; y <= grid.cells[1]; y += kBlock) {
+        for (int x = 0; x <= grid.cells[0]; x += kBlock) sample_block({x, y, z});
+      }
     }
   }
 
@@ -50,7 +57,30 @@ class Marcher {
     return grid_.origin + grid_.spacing * Eigen::RowVector3d(x, y, z);
   }
 
-  bool is_inside(std::int64_t sample) const { return values_[sample] < 0; }
+  double value(std::int64_t sample) const { return field_(position(sample)); }
+  bool is_inside(std::int64_t sample) const { return is_inside_[sample] != 0; }
+
+  /// The samples of a block, given by its lowest one, of kBlock along each side or fewer at the border. If the value in its middle is
+  /// so far from 0 that no edge from within the block can be cut, that value decides for all.
+  void sample_block(const std::array<int, 3>& low) {
+    constexpr double kHalfSide = (kBlock - 1) / 2.0;
+    const Eigen::RowVector3d middle =
+        grid_.origin +
+        grid_.spacing * Eigen::RowVector3d(low[0] + kHalfSide, low[1] + kHalfSide, low[2] + kHalfSide);
+    const double far = kSteepestField * std::numbers::sqrt3 * (kHalfSide + 1) * grid_.spacing;
+    const double in_middle = field_(middle);
+    const bool decides = std::abs(in_middle) > far;
+    std::array<int, 3> end;
+    for (int axis = 0; axis < 3; ++axis) end[axis] = std::min(low[axis] + kBlock, grid_.cells[axis] + 1);
+    for (int z = low[2]; z < end[2]; ++z) {
+      for (int y = low[1]; y < end[1]; ++y) {
+        for (int x = low[0]; x < end[0]; ++x) {
+          const std::int64_t sample = x + step_y_ * y + step_z_ * z;
+          is_inside_[sample] = (decides ? in_middle : value(sample)) < 0 ? 1 : 0;
+        }
+      }
+    }
+  }
 
   void cut_cube(std::int64_t lowest) {
     std::array<std::int64_t, 8> samples;
@@ -102,16 +132,19 @@ class Marcher {
   std::int32_t cut(const Edge& edge) {
     const auto [entry, is_new] = cuts_.try_emplace(edge, static_cast<std::int32_t>(points_.size()));
     if (is_new) {
-      const double inside = values_[edge.first], outside = values_[edge.second];
+      const double inside = value(edge.first), outside = value(edge.second);
       const double t = inside / (inside - outside);
       points_.push_back((1 - t) * position(edge.first) + t * position(edge.second));
     }
     return entry->second;
   }
 
+  static constexpr int kBlock = 8;  // samples
+
+  const ImplicitField& field_;
   SampleGrid grid_;
   std::int64_t step_y_, step_z_;
-  std::vector<double> values_;
+  std::vector<char> is_inside_;  // of each sample
   HashMap<Edge, std::int32_t> cuts_;
   std::vector<Eigen::RowVector3d> points_;
   std::vector<Triangle> triangles_;

@@ -17,8 +17,11 @@ struct SampleGrid {
   std::array<int, 3> cells{1, 1, 1};
 };
 
+/// Between two points a field may differ by at most this many times their distance.
+inline constexpr double kSteepestField = 2;
+
 /// The surface field = 0 by marching tetrahedra, six per cube (Freudenthal's subdivision, whose tetrahedra meet face to
-/// face). If the field is positive on the border of the grid, the surface is closed, manifold and oriented outwards. A
+/// face). Where the field is far from 0, its slope tells the signs of samples (kSteepestField). If the field is positive on the border of the grid, the surface is closed, manifold and oriented outwards. A
 /// sample of exactly 0 counts as outside. Triangles may be slivers.
 TriangleMesh tetrahedra_surface(const ImplicitField& field, const SampleGrid& grid);
 

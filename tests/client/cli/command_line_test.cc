@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "client/cli/exit_status.h"
@@ -163,6 +165,28 @@ TEST(GeneratedShape, EveryOneHasHandlesThatItsMeshHolds) {
 TEST(GeneratedShape, TheBarAndTheSheetAreThePapers) {
   EXPECT_EQ(generate_shape("bar", 1)->mesh.vertices.rows(), 370);
   EXPECT_EQ(generate_shape("sheet", 1)->mesh.faces.rows(), 7920);
+}
+
+TEST(GeneratedShape, HasAboutAsManyVerticesAsAskedFor) {
+  for (const std::string& name : generated_shape_names()) {
+    constexpr int kVertices = 10000;
+    const double most = name == "sphere" ? 2 : name == "neck" ? 1.1 : 1.05;
+    const auto shape = generate_shape_of(name, kVertices);
+    ASSERT_TRUE(shape.ok()) << name;
+    const double ratio = static_cast<double>(shape->mesh.vertices.rows()) / kVertices;
+    EXPECT_LE(std::max(ratio, 1 / ratio), most) << name;
+    for (const NamedHandle& handle : shape->handles) EXPECT_FALSE(handle.handle.vertices.empty()) << name;
+  }
+}
+
+TEST(GeneratedShape, RefusesTooFewAndTooManyVertices) {
+  for (const int vertices : {-1, 0, 369, 5'000'001, std::numeric_limits<int>::max()}) {
+    const auto shape = generate_shape_of("bar", vertices);
+    EXPECT_EQ(fault_of(shape.status()).reason, "SHAPE_DETAIL") << vertices;
+    EXPECT_EQ(fault_of(shape.status()).limit, "370 <= vertices <= 5000000");
+  }
+  EXPECT_EQ(generate_shape_of("bar", 370)->mesh.vertices.rows(), 370);
+  EXPECT_EQ(fault_of(generate_shape_of("cube", 1000).status()).reason, "SHAPE_UNKNOWN");
 }
 
 TEST(GeneratedShape, NamesWhatThereIs) {
