@@ -23,8 +23,8 @@ using Point = Eigen::RowVector3d;
 constexpr int kMostVertices = 5'000'000;
 constexpr double kHalfCell = 0.5;
 
-/// A shape of a given number of vertices is made again, at most so often, until it is as close as this.
-constexpr int kRounds = 2;
+/// Most tries at a shape of a given number of vertices, and the relative difference at which there are no more.
+constexpr int kTries = 2;
 constexpr double kCloseEnough = 0.05;
 
 int cells(double count) {
@@ -180,22 +180,26 @@ absl::StatusOr<GeneratedShape> generate_shape(std::string_view name, int detail)
 absl::StatusOr<GeneratedShape> generate_shape_of(std::string_view name, int vertices) {
   const absl::StatusOr<const Entry*> entry = entry_of(name);
   if (!entry.ok()) return entry.status();
-  GeneratedShape shape = (*entry)->make(1);
-  const auto least = shape.mesh.vertices.rows();
+  GeneratedShape closest = (*entry)->make(1);
+  const auto least = closest.mesh.vertices.rows();
   if (vertices < least || vertices > kMostVertices)
     return make_fault({Reason::kShapeDetail, "", absl::StrCat(least, " <= vertices <= ", kMostVertices)},
                       absl::StrCat("The ", (*entry)->name, " has ", least, " to ", kMostVertices,
                                    " vertices, not ", vertices, "."));
-  double detail = 1;
-  for (int round = 0; round < kRounds; ++round) {
-    const double ratio = vertices / static_cast<double>(shape.mesh.vertices.rows());
-    if (std::abs(ratio - 1) < kCloseEnough) break;
-    const double next = std::max(1.0, detail_for(**entry, detail, ratio));
+  const auto times_too_many = [&](const GeneratedShape& shape) {
+    return static_cast<double>(shape.mesh.vertices.rows()) / vertices;
+  };
+  const auto miss = [&](const GeneratedShape& shape) { return std::abs(std::log(times_too_many(shape))); };
+  double detail = 1, ratio = times_too_many(closest);
+  for (int number = 0; number < kTries && miss(closest) > kCloseEnough; ++number) {
+    const double next = std::max(1.0, detail_for(**entry, detail, 1 / ratio));
     if (next == detail) break;
     detail = next;
-    shape = (*entry)->make(detail);
+    GeneratedShape shape = (*entry)->make(detail);
+    ratio = times_too_many(shape);
+    if (miss(shape) < miss(closest)) closest = std::move(shape);
   }
-  return shape;
+  return closest;
 }
 
 std::vector<std::string> generated_shape_names() {

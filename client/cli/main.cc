@@ -387,7 +387,8 @@ void add_shape(CLI::App& program, std::function<ExitStatus()>& command) {
   CLI::Option* const detail =
       app.add_option("--detail", options->detail, "Multiplies the cells along each side (1)")
           ->option_text("N");
-  app.add_option("--vertices", options->vertices, "About how many vertices, up to 5 million")
+  app.add_option("--vertices", options->vertices, "About how many vertices it has, at most 5 million")
+      ->check(positive())
       ->option_text("N")
       ->excludes(detail);
   app.add_option("--out", options->out,

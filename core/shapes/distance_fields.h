@@ -43,7 +43,7 @@ double blended_difference(double solid, double hole, double width);
 
 /// The surface field = 0 within [low, high], sampled on cubes, `resolution` of them along the longest side, and
 /// remeshed to well-shaped triangles. The field must be positive on the border and have a gradient of about unit length
-/// near 0.
+/// near 0, and nowhere be steeper than kSteepestField.
 TriangleMesh field_surface(const ImplicitField& field, const Eigen::RowVector3d& low,
                            const Eigen::RowVector3d& high, int resolution);
 

@@ -23,14 +23,12 @@ constexpr std::array<std::array<int, 4>, 6> kTetrahedra{
 class Marcher {
  public:
   Marcher(const ImplicitField& field, const SampleGrid& grid)
-      : field_(field),
-        grid_(grid),
-        step_y_(grid.cells[0] + 1),
-        step_z_(step_y_ * (grid.cells[1] + 1)),
-        is_inside_(step_z_ * (grid.cells[2] + 1)) {
-    for (int z = 0; z <= grid.cells[2]; z += kBlock) {
-      for (int y = 0; y <= grid.cells[1]; y += kBlock) {
-        for (int x = 0; x <= grid.cells[0]; x += kBlock) sample_block({x, y, z});
+      : field_(field), grid_(grid), step_y_(grid.cells[0] + 1), step_z_(step_y_ * (grid.cells[1] + 1)) {
+    for (int axis = 0; axis < 3; ++axis) blocks_[axis] = grid.cells[axis] / kBlock + 1;
+    first_flag_.reserve(static_cast<std::size_t>(blocks_[0]) * blocks_[1] * blocks_[2]);
+    for (int z = 0; z < blocks_[2]; ++z) {
+      for (int y = 0; y < blocks_[1]; ++y) {
+        for (int x = 0; x < blocks_[0]; ++x) add_block({kBlock * x, kBlock * y, kBlock * z});
       }
     }
   }
@@ -38,7 +36,10 @@ class Marcher {
   TriangleMesh surface() {
     for (std::int64_t z = 0; z < grid_.cells[2]; ++z) {
       for (std::int64_t y = 0; y < grid_.cells[1]; ++y) {
-        for (std::int64_t x = 0; x < grid_.cells[0]; ++x) cut_cube(x + step_y_ * y + step_z_ * z);
+        for (int block = 0; block < blocks_[0]; ++block) {
+          if (may_be_cut({block, static_cast<int>(y / kBlock), static_cast<int>(z / kBlock)}))
+            cut_cubes(block, y, z);
+        }
       }
     }
     TriangleMesh mesh;
@@ -52,55 +53,97 @@ class Marcher {
   }
 
  private:
+  struct Sample {
+    std::int64_t number;
+    bool is_inside;
+  };
+
   Eigen::RowVector3d position(std::int64_t sample) const {
     const std::int64_t x = sample % step_y_, y = sample % step_z_ / step_y_, z = sample / step_z_;
     return grid_.origin + grid_.spacing * Eigen::RowVector3d(x, y, z);
   }
 
   double value(std::int64_t sample) const { return field_(position(sample)); }
-  bool is_inside(std::int64_t sample) const { return is_inside_[sample] != 0; }
 
-  /// The samples of a block, given by its lowest one, of kBlock along each side or fewer at the border. If the value in its middle is
-  /// so far from 0 that no edge from within the block can be cut, that value decides for all.
-  void sample_block(const std::array<int, 3>& low) {
+  std::int64_t block_at(int x, int y, int z) const {
+    return x + static_cast<std::int64_t>(blocks_[0]) * (y + static_cast<std::int64_t>(blocks_[1]) * z);
+  }
+
+  bool is_inside(int x, int y, int z) const {
+    const std::int64_t first = first_flag_[block_at(x / kBlock, y / kBlock, z / kBlock)];
+    if (first < 0) return first == kInside;
+    return flags_[first + x % kBlock + kBlock * (y % kBlock + kBlock * (z % kBlock))] != 0;
+  }
+
+  /// Adds the block whose lowest sample is `low`. If the value in its middle is so far from 0 that all of its samples must have the
+  /// same sign, the block keeps that sign alone.
+  void add_block(const std::array<int, 3>& low) {
     constexpr double kHalfSide = (kBlock - 1) / 2.0;
-    const Eigen::RowVector3d middle =
-        grid_.origin +
-        grid_.spacing * Eigen::RowVector3d(low[0] + kHalfSide, low[1] + kHalfSide, low[2] + kHalfSide);
-    const double far = kSteepestField * std::numbers::sqrt3 * (kHalfSide + 1) * grid_.spacing;
-    const double in_middle = field_(middle);
-    const bool decides = std::abs(in_middle) > far;
-    std::array<int, 3> end;
-    for (int axis = 0; axis < 3; ++axis) end[axis] = std::min(low[axis] + kBlock, grid_.cells[axis] + 1);
-    for (int z = low[2]; z < end[2]; ++z) {
-      for (int y = low[1]; y < end[1]; ++y) {
-        for (int x = low[0]; x < end[0]; ++x) {
-          const std::int64_t sample = x + step_y_ * y + step_z_ * z;
-          is_inside_[sample] = (decides ? in_middle : value(sample)) < 0 ? 1 : 0;
+    const Eigen::RowVector3d at(low[0], low[1], low[2]);
+    const double in_middle = field_(grid_.origin + grid_.spacing * (at.array() + kHalfSide).matrix());
+    const double farthest = std::numbers::sqrt3 * kHalfSide * grid_.spacing;  // sample from the middle
+    if (std::abs(in_middle) > kSteepestField * farthest) {
+      first_flag_.push_back(in_middle < 0 ? kInside : kOutside);
+      return;
+    }
+    first_flag_.push_back(static_cast<std::int64_t>(flags_.size()));
+    for (int z = 0; z < kBlock; ++z) {
+      for (int y = 0; y < kBlock; ++y) {
+        for (int x = 0; x < kBlock; ++x) {
+          const bool is_in_grid =
+              low[0] + x < step_y_ && low[1] + y <= grid_.cells[1] && low[2] + z <= grid_.cells[2];
+          const std::int64_t sample = low[0] + x + step_y_ * (low[1] + y) + step_z_ * (low[2] + z);
+          flags_.push_back(is_in_grid && value(sample) < 0 ? 1 : 0);
         }
       }
     }
   }
 
-  void cut_cube(std::int64_t lowest) {
-    std::array<std::int64_t, 8> samples;
+  /// Whether a cube whose lowest sample is in this block may be cut: not if the block and those next to it are all inside or all
+  /// outside.
+  bool may_be_cut(const std::array<int, 3>& block) const {
+    const std::int64_t first = first_flag_[block_at(block[0], block[1], block[2])];
+    if (first >= 0) return true;
+    std::array<int, 3> next;
+    for (int axis = 0; axis < 3; ++axis) next[axis] = std::min(block[axis] + 1, blocks_[axis] - 1);
+    for (int corner = 1; corner < 8; ++corner) {
+      const std::int64_t other =
+          first_flag_[block_at((corner & 1) != 0 ? next[0] : block[0], (corner & 2) != 0 ? next[1] : block[1],
+                               (corner & 4) != 0 ? next[2] : block[2])];
+      if (other != first) return true;
+    }
+    return false;
+  }
+
+  /// Cuts the cubes of a row whose lowest samples are in the same block.
+  void cut_cubes(int block, std::int64_t y, std::int64_t z) {
+    const int end = std::min(kBlock * (block + 1), grid_.cells[0]);
+    for (int x = kBlock * block; x < end; ++x) cut_cube(x, static_cast<int>(y), static_cast<int>(z));
+  }
+
+  void cut_cube(int x, int y, int z) {
+    const std::int64_t lowest = x + step_y_ * y + step_z_ * z;
+    std::array<Sample, 8> samples;
     int inside = 0;
     for (int corner = 0; corner < 8; ++corner) {
-      samples[corner] = lowest + (corner & 1) + (corner >> 1 & 1) * step_y_ + (corner >> 2) * step_z_;
-      inside += is_inside(samples[corner]) ? 1 : 0;
+      const int right = corner & 1, back = corner >> 1 & 1, up = corner >> 2;
+      samples[corner] = {lowest + right + back * step_y_ + up * step_z_,
+                         is_inside(x + right, y + back, z + up)};
+      inside += samples[corner].is_inside ? 1 : 0;
     }
     if (inside == 0 || inside == 8) return;
     for (const std::array<int, 4>& tetrahedron : kTetrahedra) {
-      std::array<std::int64_t, 4> corners;
+      std::array<Sample, 4> corners;
       for (int k = 0; k < 4; ++k) corners[k] = samples[tetrahedron[k]];
       cut_tetrahedron(corners);
     }
   }
 
-  void cut_tetrahedron(std::array<std::int64_t, 4> corners) {
+  void cut_tetrahedron(std::array<Sample, 4> corners) {
     const auto middle = std::stable_partition(corners.begin(), corners.end(),
-                                              [&](std::int64_t sample) { return is_inside(sample); });
-    const auto [a, b, c, d] = corners;
+                                              [](const Sample& sample) { return sample.is_inside; });
+    const std::int64_t a = corners[0].number, b = corners[1].number, c = corners[2].number,
+                       d = corners[3].number;
     switch (middle - corners.begin()) {
       case 1:
         return add_triangle({{{a, b}, {a, c}, {a, d}}});
@@ -139,12 +182,15 @@ class Marcher {
     return entry->second;
   }
 
-  static constexpr int kBlock = 8;  // samples
+  static constexpr int kBlock = 8;  // samples along each side
+  static constexpr std::int64_t kInside = -1, kOutside = -2;
 
   const ImplicitField& field_;
   SampleGrid grid_;
   std::int64_t step_y_, step_z_;
-  std::vector<char> is_inside_;  // of each sample
+  std::array<int, 3> blocks_;             // along each axis
+  std::vector<std::int64_t> first_flag_;  // of each block, in flags_; kInside or kOutside if it has none
+  std::vector<char> flags_;               // whether each sample of such a block is inside
   HashMap<Edge, std::int32_t> cuts_;
   std::vector<Eigen::RowVector3d> points_;
   std::vector<Triangle> triangles_;

@@ -21,8 +21,9 @@ struct SampleGrid {
 inline constexpr double kSteepestField = 2;
 
 /// The surface field = 0 by marching tetrahedra, six per cube (Freudenthal's subdivision, whose tetrahedra meet face to
-/// face). Where the field is far from 0, its slope tells the signs of samples (kSteepestField). If the field is positive on the border of the grid, the surface is closed, manifold and oriented outwards. A
-/// sample of exactly 0 counts as outside. Triangles may be slivers.
+/// face). The slope of the field must be at most kSteepestField in the grid and up to seven cubes around it: where the
+/// field is far from 0, one value decides for many samples. If the field is positive on the border of the grid, the
+/// surface is closed, manifold and oriented outwards. A sample of exactly 0 counts as outside. Triangles may be slivers.
 TriangleMesh tetrahedra_surface(const ImplicitField& field, const SampleGrid& grid);
 
 }  // namespace lpdeform

@@ -7,6 +7,7 @@
 #include <array>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "client/cli/exit_status.h"
 #include "client/cli/files/core_motion.h"
@@ -168,15 +169,28 @@ TEST(GeneratedShape, TheBarAndTheSheetAreThePapers) {
 }
 
 TEST(GeneratedShape, HasAboutAsManyVerticesAsAskedFor) {
-  for (const std::string& name : generated_shape_names()) {
-    constexpr int kVertices = 10000;
-    const double most = name == "sphere" ? 2 : name == "neck" ? 1.1 : 1.05;
-    const auto shape = generate_shape_of(name, kVertices);
+  const auto check = [](const std::string& name, int vertices, double most) {
+    const auto shape = generate_shape_of(name, vertices);
     ASSERT_TRUE(shape.ok()) << name;
-    const double ratio = static_cast<double>(shape->mesh.vertices.rows()) / kVertices;
-    EXPECT_LE(std::max(ratio, 1 / ratio), most) << name;
-    for (const NamedHandle& handle : shape->handles) EXPECT_FALSE(handle.handle.vertices.empty()) << name;
+    const double ratio = static_cast<double>(shape->mesh.vertices.rows()) / vertices;
+    EXPECT_LE(std::max(ratio, 1 / ratio), most) << name << " of " << vertices;
+    std::set<std::uint32_t> held;
+    std::size_t count = 0;
+    for (const NamedHandle& handle : shape->handles) {
+      EXPECT_FALSE(handle.handle.vertices.empty()) << name;
+      held.insert(handle.handle.vertices.begin(), handle.handle.vertices.end());
+      count += handle.handle.vertices.size();
+    }
+    EXPECT_EQ(held.size(), count) << name << ": handles have vertices in common";
+  };
+  for (const char* name : {"bar", "block", "grid", "neck", "sheet"}) {
+    for (const int vertices : {450, 1721, 8100}) {
+      if (vertices >= generate_shape(name, 1)->mesh.vertices.rows()) check(name, vertices, 1.15);
+    }
+    for (const int vertices : {15000, 123456}) check(name, vertices, 1.05);
   }
+  for (const char* name : {"creature", "arm", "pierced_block", "scan", "tree"}) check(name, 4000, 1.05);
+  for (const int vertices : {2562, 4000, 50000}) check("sphere", vertices, 2);
 }
 
 TEST(GeneratedShape, RefusesTooFewAndTooManyVertices) {
