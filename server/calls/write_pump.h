@@ -69,7 +69,7 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
   /// The call is over: release what it holds. Called with the lock held, at least once.
   virtual void release() = 0;
 
-  /// A message has been made, so there may be room for more. Called with the lock held.
+  /// A message has been made, and is about to be written; there may be room for more. Called with the lock held.
   virtual void on_made() {}
 
   /// gRPC takes the next message. `took`: since it was given this one. Called with the lock held.
@@ -92,8 +92,8 @@ class WritePump : public Reactor, public std::enable_shared_from_this<WritePump<
     write_began_ = std::chrono::steady_clock::now();
     is_last_written_ = made == Made::kLastMessage;
     record_->sent(response_.ByteSizeLong());
-    this->StartWrite(&response_);
     on_made();
+    this->StartWrite(&response_);
   }
 
   CallRecord& record() const { return *record_; }

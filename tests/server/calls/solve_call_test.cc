@@ -31,6 +31,17 @@ class SolveCallTest : public ServiceTest {
     return request;
   }
 
+  /// Until the session has this input.
+  void wait_for_input(const v1::CreateSessionResponse& session, std::uint64_t input_seq) {
+    v1::GetSessionRequest request;
+    request.set_session(session.session().name());
+    v1::GetSessionResponse response;
+    do {
+      grpc::ClientContext context;
+      ASSERT_TRUE(stub_->GetSession(&context, request, &response).ok());
+    } while (response.session().input_seq() < input_seq);
+  }
+
   void expect_solves(const v1::CreateSessionResponse& session, std::uint64_t input_seq) {
     v1::SolveRequest request = solve_request(session);
     v1::Update& update = *request.mutable_update();
@@ -136,11 +147,10 @@ TEST_F(SolveByManualTimeTest, SaysThatItIsThereWhereverItHasNothingElseToSay) {
   const auto session = create(bar_mesh());
   v1::SolveRequest request = slow_request(session);
   request.set_progress(false);
-  const std::size_t waiting = timers_->waiting();
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::minutes(1));
   const auto stream = stub_->Solve(&context, request);
-  while (timers_->waiting() == waiting) std::this_thread::yield();  // until the server has the call
+  wait_for_input(session, 1);  // the server has the call, and its timer
   v1::SolveResponse response;
   for (int beat = 0; beat < 3; ++beat) {
     timers_->advance(options_.heartbeat / 2);
@@ -149,7 +159,8 @@ TEST_F(SolveByManualTimeTest, SaysThatItIsThereWhereverItHasNothingElseToSay) {
     ASSERT_TRUE(response.has_heartbeat()) << response.ShortDebugString();
   }
   timers_->advance(options_.heartbeat / 2);
-  ASSERT_TRUE(update(session, tip_message(2, 1)).ok());  // ends it
+  const grpc::Status updated = update(session, tip_message(2, 1));
+  ASSERT_TRUE(updated.ok()) << updated.error_message();  // ends it
   EXPECT_FALSE(stream->Read(&response)) << response.ShortDebugString();
   EXPECT_EQ(details_of(stream->Finish()).info.reason(), "SUPERSEDED");
 }
