@@ -31,13 +31,15 @@ class SolveCallTest : public ServiceTest {
     return request;
   }
 
-  /// Until the session has this input.
+  /// Waits until the session has this input, at most for kTestDeadline.
   void wait_for_input(const v1::CreateSessionResponse& session, std::uint64_t input_seq) {
+    const auto end = std::chrono::system_clock::now() + kTestDeadline;
     v1::GetSessionRequest request;
     request.set_session(session.session().name());
     v1::GetSessionResponse response;
     do {
       grpc::ClientContext context;
+      context.set_deadline(end);
       ASSERT_TRUE(stub_->GetSession(&context, request, &response).ok());
     } while (response.session().input_seq() < input_seq);
   }
