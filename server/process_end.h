@@ -21,8 +21,9 @@ class ProcessEnd {
   ProcessEnd& operator=(const ProcessEnd&) = delete;
 
   /// Ends the process with `status` after `patience`, unless this object is destroyed before. The log then
-  /// says so ("end_forced") and has kForLog to write its queue. Call it once.
-  void within(std::chrono::milliseconds patience, int status, std::weak_ptr<const Log> log);
+  /// says so ("end_forced") and has `for_log` to write its queue. Call it once.
+  void within(std::chrono::milliseconds patience, int status, std::weak_ptr<const Log> log,
+              std::chrono::milliseconds for_log = kForLog);
   static constexpr std::chrono::milliseconds kForLog{500};
 
  private:

@@ -326,9 +326,13 @@ absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::settle(double timeout
   for (;;) {
     {
       const std::scoped_lock lock(frame_mutex_);
+      // Asked before the box is looked into: if the last frame is the result only because a newer update was refused,
+      // the refusal is in the box by now, and is returned first.
+      const bool is_settled = last_frame_ && (*live)->is_result(*last_frame_);
       const absl::StatusOr<bool> taken = take_newest(**live);
       if (!taken.ok()) return taken.status();
-      if (last_frame_ && (*live)->is_result(*last_frame_)) return write(*last_frame_, buffers);
+      if (*taken) continue;
+      if (is_settled) return write(*last_frame_, buffers);
     }
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
     if (left.count() <= 0) return no_result((*live)->last_problem());

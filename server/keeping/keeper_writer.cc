@@ -150,6 +150,10 @@ absl::StatusOr<std::vector<ChangeOutcome>> Keeper::commit(std::span<const Work> 
   std::vector<StoredChange> changes;
   const Clock::time_point begin = Clock::now();
   absl::Status status;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (is_over_) return store_failing(kEnds);  // flush() has told what is not stored
+  }
   const StoreCalls::UnderWay call(calls_, begin, bytes_of(works));
   for (const Work& work : works) {
     changes.push_back(work.change);

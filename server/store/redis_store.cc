@@ -48,7 +48,9 @@ class RedisStore final : public Store {
   absl::Status begin() {
     const std::scoped_lock lock(touching_);
     holder_ = kShown + holder_;
-    is_shown_ = show().ok();
+    const absl::Status shown = show();
+    if (is_away(shown)) return shown;
+    is_shown_ = shown.ok();
     if (!is_shown_)
       holder_ = random_hex_128();  // this user may not SUBSCRIBE, so others wait for the lease to end
     const auto ran = toucher_.run({"HGET", "lpdeform:time", "ran"});

@@ -1,6 +1,7 @@
 """What lpdeform-server's log tells an operator: why a stream ended, which update was refused, and no more lines than can be
 read. It uses the Python client's messages, so it runs in the environment of deploy/install python."""
 
+import collections
 import concurrent.futures
 import contextlib
 import glob
@@ -130,8 +131,12 @@ class Streams(Log):
         ended = self.next_end(server)
         self.assertEqual((ended["reason"], ended["session"]), ("cancelled", self.digits(session)))
 
-        read_to_end(client.frames(session, timeout=1))
-        self.assertEqual(self.next_end(server)["reason"], "deadline")
+        # The client takes a call back whose time is over: a server that gets no core just then sees only that.
+        ends = collections.Counter(["cancelled"])
+        while not ends["deadline"]:
+            self.assertLess(ends.total(), 10)
+            read_to_end(client.frames(session, timeout=5))
+            ends[self.next_end(server)["reason"]] += 1
 
         stream, send = client.deform(session)
         send(service_pb2.DeformRequest(open=service_pb2.DeformOpen(session=session.session.name)))
@@ -150,8 +155,10 @@ class Streams(Log):
         read_to_end(stream)
         self.assertEqual(self.next_end(server)["reason"], "session_deleted")
 
-        for reason in ("cancelled", "deadline", "misuse", "writer_replaced", "session_deleted"):
-            self.assertEqual(self.shown(server)[f'lpdeform_streams_ended_total{{reason="{reason}"}}'], 1, reason)
+        ends.update(["misuse", "writer_replaced", "session_deleted"])
+        self.assertLessEqual(set(ends), {"cancelled", "deadline", "misuse", "writer_replaced", "session_deleted"})
+        for reason, count in ends.items():
+            self.assertEqual(self.shown(server)[f'lpdeform_streams_ended_total{{reason="{reason}"}}'], count, reason)
 
         stream = client.frames(client.create())
         self.assertEqual(server.stop(), 0)
@@ -159,7 +166,7 @@ class Streams(Log):
         self.assertEqual(self.next_end(server)["reason"], "draining")
 
     def test_of_a_session_that_nobody_used_it_says_so(self):
-        server, client = self.serve("--session-idle", "1")
+        server, client = self.serve("--session-idle", "3")
         read_to_end(client.frames(client.create()))
         self.assertEqual(self.next_end(server)["reason"], "session_expired")
 

@@ -59,7 +59,7 @@ class Server:
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
-    running = Server("--heartbeat", "0.5")
+    running = Server("--heartbeat", "2")
     yield running
     if running._process.poll() is None:
         running.stop()

@@ -180,6 +180,26 @@ def test_a_session_taken_over_does_not_wait_for_the_next_try_to_recreate_it(link
     assert len(server.asked("CreateSession")) == 1
 
 
+def test_a_session_taken_over_while_a_stream_begins_does_not_stay_on_it(
+    link: Link, server: FakeServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin = server.deform
+
+    def take_over_meanwhile(requests: Iterator[bytes]) -> FakeStream:
+        monkeypatch.undo()
+        stream = begin(requests)
+        link.take_over()
+        return stream
+
+    first = server.stream().opened()
+    monkeypatch.setattr(server, "deform", take_over_meanwhile)
+    first.end(make(Code.UNAVAILABLE, "Killed."))
+    assert server.stream().opened().open.writer_token == "token"
+    begun = time.monotonic()
+    assert server.stream().opened().open.writer_token == "another"
+    assert time.monotonic() - begun < 30  # and not only once it has been silent for 45 s
+
+
 def test_a_session_taken_over_counts_streams_that_do_not_fit_from_the_start(link: Link, server: FakeServer) -> None:
     for _ in range(2):
         for _ in range(RecoveryRules.most_misfits):

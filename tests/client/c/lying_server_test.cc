@@ -113,7 +113,7 @@ TEST_F(LyingServerTest, ClosingDoesNotWaitForAServerThatHangs) {
   lpdeform_close(std::exchange(session_, nullptr));
   lpdeform_disconnect(
       std::exchange(client_, nullptr));  // the timeout of calls is longer than this test may take
-  EXPECT_EQ(server_->deletions(), 1);
+  EXPECT_TRUE(eventually([&] { return server_->deletions() == 1; }));
 }
 
 TEST_F(LyingServerTest, ASessionOfAnotherMeshIsRefused) {
@@ -139,7 +139,9 @@ TEST_F(LyingServerTest, AFrameOfAnotherMeshIsDroppedAndSaidByTheState) {
   std::vector<Point> points(9, Point{7, 7, 7});
   const lpdeform_buffers buffers = three_of(points);
   EXPECT_TRUE(eventually([&] {
-    EXPECT_EQ(lpdeform_poll(session_, &buffers, nullptr, &error_), LPDEFORM_NO_FRAME) << error_.message;
+    const lpdeform_code code = lpdeform_poll(session_, &buffers, nullptr, &error_);
+    EXPECT_TRUE(code == LPDEFORM_NO_FRAME || code == LPDEFORM_DATA_LOSS)
+        << error_.message;  // after some tries
     return state() != LPDEFORM_STATE_LIVE && std::string(error_.reason) == "FRAME_PARTS";
   }));
   EXPECT_EQ(error_.code, LPDEFORM_DATA_LOSS);

@@ -132,23 +132,6 @@ TEST_F(CSessionTest, ANameThatIsNotUtf8IsRefusedAtTheCallAndTheSessionGoesOn) {
             LPDEFORM_INVALID_ARGUMENT);
 }
 
-TEST_F(CSessionTest, SettlingAfterTheResultWasTakenGivesItAgain) {
-  open(strip_.mesh());
-  hold("base", {0, 1});
-  const std::uint64_t seq = hold("tip", {20, 21}, shift(0, 2, 0));
-  std::vector<Point> points(22);
-  const lpdeform_buffers buffers = buffers_of(points);
-  EXPECT_TRUE(eventually([&] {
-    return lpdeform_poll(session_, &buffers, &frame_, &error_) == LPDEFORM_OK && frame_.is_final == 1 &&
-           frame_.input_seq == seq;
-  }));
-  const std::vector<Point> polled = points;
-  const std::uint64_t frame_seq = frame_.frame_seq;
-  EXPECT_EQ(settle(22), polled);
-  EXPECT_EQ(frame_.frame_seq, frame_seq);
-  EXPECT_EQ(frame_.input_seq, seq);
-}
-
 TEST_F(CSessionTest, SolvingGivesAResultOfItsOwnBesideTheFrames) {
   open(strip_.mesh());
   hold("base", {0, 1});

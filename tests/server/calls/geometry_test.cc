@@ -150,15 +150,21 @@ class UpdatesUnderWay {
 };
 
 TEST_F(GeometryTest, OthersAreAnsweredWhileTheGeometryOfALargeMeshIsLookedAt) {
-  const auto large = create(necked_bar(60, 80, 20, 20)), small = create(bar_mesh());
-  const UpdatesUnderWay updates(*stub_, large, 8);  // more than the pool has threads
+  const auto small = create(bar_mesh());
   std::uint64_t seq = 0;
-  for (int k = 0; k < 20; ++k) ASSERT_TRUE(update(small, ends_message(bar_mesh().vertices, ++seq, 1)).ok());
-  EXPECT_TRUE(updates.ended().empty());
-  for (const grpc::Status& status : updates.wait()) EXPECT_TRUE(status.ok()) << status.error_message();
-  const v1::Session after = describe(large);
-  EXPECT_TRUE(after.settings().p().has_per_vertex());
-  EXPECT_EQ(after.handles_size(), 1);
+  bool are_others_first = false;
+  for (int tries = 0; tries < 10 && !are_others_first;
+       ++tries) {  // this thread may get no turn for as long as it takes
+    const auto large = create(necked_bar(60, 80, 20, 20));
+    const UpdatesUnderWay updates(*stub_, large, 8);  // more than the pool has threads
+    for (int k = 0; k < 20; ++k) ASSERT_TRUE(update(small, ends_message(bar_mesh().vertices, ++seq, 1)).ok());
+    are_others_first = updates.ended().empty();
+    for (const grpc::Status& status : updates.wait()) EXPECT_TRUE(status.ok()) << status.error_message();
+    const v1::Session after = describe(large);
+    EXPECT_TRUE(after.settings().p().has_per_vertex());
+    EXPECT_EQ(after.handles_size(), 1);
+  }
+  EXPECT_TRUE(are_others_first);
 }
 
 TEST_F(GeometryTest, AStreamAndASolveWaitForTheGeometryInTheirTurn) {

@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <functional>
 #include <future>
 #include <latch>
+#include <utility>
 #include <vector>
 
 namespace lpdeform {
@@ -71,19 +73,19 @@ TEST(Scheduler, WhoeverUsedLessTimeGoesFirst) {
   is_busy.get_future().wait();
   scheduler.wake(std::make_shared<Job>(false, [&] {
     spin(std::chrono::milliseconds(5));
-    return ++large < 1000 && small < 200;
+    return ++large < 10000 && small < 2000;
   }));
   scheduler.wake(std::make_shared<Job>(false, [&] {
     spin(std::chrono::microseconds(50));
-    if (++small < 200) return true;
+    if (++small < 2000) return true;
     done.set_value();
     return false;
   }));
   done.get_future().wait();
   release.count_down();
   // Equal shares of time mean a hundred small slices for each large one; with turns in order it would be one.
-  EXPECT_GE(small, 200);
-  EXPECT_LT(large, 40);
+  EXPECT_GE(small, 2000);
+  EXPECT_LT(large, 400);
 }
 
 /// A scheduler of two threads, one of which is busy, so that the other has to choose.
@@ -147,7 +149,7 @@ TEST(Scheduler, RefinementsKeepAShareBesideEndlessAnswers) {
   OneThread one;  // after what its jobs use: one may run yet
   for (int k = 0; k < 3; ++k) {
     answering.push_back(std::make_shared<Job>(false, [&, k] {
-      spin(std::chrono::microseconds(100));
+      spin(std::chrono::milliseconds(1));  // a thread that is held up for long counts for few slices
       ++answers;
       one.scheduler.wake(answering[static_cast<std::size_t>(k)],
                          Urgency::kAnswer);  // the next update is there
@@ -155,7 +157,7 @@ TEST(Scheduler, RefinementsKeepAShareBesideEndlessAnswers) {
     }));
   }
   const auto refining = std::make_shared<Job>(false, [&] {
-    spin(std::chrono::microseconds(100));
+    spin(std::chrono::milliseconds(1));
     if (++refinements == 200) done.set_value();
     return refinements < 200;
   });
@@ -176,8 +178,8 @@ TEST(Scheduler, AHeavierWeightHasALargerShare) {
         [&] {
           spin(std::chrono::milliseconds(1));  // a thread that is held up for long counts for little
           ++count;
-          if (plain + weighty == 500) done.set_value();
-          return plain + weighty < 500;
+          if (plain + weighty == 2000) done.set_value();
+          return plain + weighty < 2000;
         },
         weight);
   };
@@ -241,11 +243,17 @@ TEST(Scheduler, IdleSlicesWaitForAllOthersAndAreNoOverload) {
   {
     Scheduler scheduler(2);
     // Three that always have something to do on two threads: one of them always waits.
-    const auto busy = [&] {
+    std::atomic<int> awake = 0;
+    const auto busy = [&](bool& is_awake) {
       spin(std::chrono::milliseconds(2));
-      if (ordinary == 0) idle_meanwhile = -idle;
-      if (++ordinary < 300) return true;
-      if (ordinary == 300) {
+      if (!std::exchange(is_awake, true)) ++awake;
+      if (awake < 3) {
+        idle_meanwhile = -idle;
+        return true;
+      }
+      const int slices = ++ordinary;
+      if (slices < 300) return true;
+      if (slices == 300) {
         idle_meanwhile += idle;
         ended.set_value();
       }
@@ -257,11 +265,13 @@ TEST(Scheduler, IdleSlicesWaitForAllOthersAndAreNoOverload) {
       return true;
     }));
     idle_runs.get_future().wait();
-    for (int k = 0; k < 3; ++k) scheduler.wake(std::make_shared<Job>(false, busy));
+    std::array<bool, 3> are_awake{};
+    for (bool& is_awake : are_awake)
+      scheduler.wake(std::make_shared<Job>(false, [&] { return busy(is_awake); }));
     ended.get_future().wait();
     EXPECT_FALSE(scheduler.is_overloaded());
   }
-  EXPECT_LE(idle_meanwhile, 200);  // some before all three were awake; while they run, none
+  EXPECT_LE(idle_meanwhile, 50);  // some as the last of the three begins; while they run, none
 }
 
 TEST(Scheduler, AnIdleSliceThatIsWokenGoesWithItsNewUrgency) {

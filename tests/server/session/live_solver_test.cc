@@ -108,13 +108,12 @@ TEST_F(LiveSolverTest, UnderOverloadAnswersComeAtOnceAndRefinementsSeldom) {
     update.settings.solver =
         SolveSettings{.method = Method::kLineSearch, .tolerance = 1e-14, .max_iterations = 1 << 30};
     ASSERT_TRUE(mailbox_.take(update).ok());
+    const auto begin = std::chrono::steady_clock::now();
     ASSERT_TRUE(solver_.run_slice(nullptr, pace));
     const auto answer = publisher_->newest();
     EXPECT_EQ(answer->input_seq, input);  // in the first slice
-    const auto begin = std::chrono::steady_clock::now();
     while (publisher_->newest() == answer) ASSERT_TRUE(solver_.run_slice(nullptr, pace));
-    EXPECT_GE(std::chrono::steady_clock::now() - begin,
-              LiveSolver::kBetweenRefinements - std::chrono::milliseconds(50));
+    EXPECT_GE(std::chrono::steady_clock::now() - begin, LiveSolver::kBetweenRefinements);
     while (stream->next()) {
     }
     ASSERT_TRUE(stream->acknowledge(publisher_->newest()->frame_seq).ok());

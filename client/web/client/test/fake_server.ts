@@ -142,7 +142,6 @@ export class FakeServer {
       await new Promise<void>((resolve) => {
         this.#changed.add(resolve);
       });
-      this.#changed.clear();
     }
   }
 
@@ -151,7 +150,9 @@ export class FakeServer {
   }
 
   #note(): void {
-    for (const resolve of this.#changed) resolve();
+    const waiting = this.#changed;
+    this.#changed = new Set();
+    for (const resolve of waiting) resolve();
   }
 
   #transport(): Transport {

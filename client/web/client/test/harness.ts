@@ -78,10 +78,10 @@ export function refusal(
   );
   const info = new Uint8Array([...field(1, text(reason)), ...entries]);
   error.details.push({ type: "google.rpc.ErrorInfo", value: info });
-  const nanos = retryMs * 1e6;
   const varint = (value: number): number[] =>
     value < 128 ? [value] : [(value % 128) | 128, ...varint(Math.floor(value / 128))];
-  const duration = new Uint8Array([16, ...varint(nanos)]);
+  const [seconds, nanos] = [Math.floor(retryMs / 1000), (retryMs % 1000) * 1e6];
+  const duration = new Uint8Array([8, ...varint(seconds), 16, ...varint(nanos)]);
   if (retryMs > 0) error.details.push({ type: "google.rpc.RetryInfo", value: new Uint8Array(field(1, duration)) });
   return error;
 }

@@ -275,12 +275,12 @@ describe("a server that was away for a moment", () => {
 describe("a session that is taken over", () => {
   test("does not wait for the pause between two tries", async () => {
     const { server, session } = await begin();
-    server.stream.queue.finish(refusal("SERVER_BUSY", {}, Code.ResourceExhausted, 900));
+    server.stream.queue.finish(refusal("SERVER_BUSY", {}, Code.ResourceExhausted, 30_000));
     await new Promise((resolve) => setTimeout(resolve, 50));
     const start = performance.now();
     await session.takeOver();
     await server.until(() => server.streams.length === 2);
-    expect(performance.now() - start).toBeLessThan(500);
+    expect(performance.now() - start).toBeLessThan(15_000);
   });
 
   test("is not recreated for what went before", async () => {
@@ -295,7 +295,7 @@ describe("a session that is taken over", () => {
   test("sends what waits at once", async () => {
     const { server, session } = await begin();
     server.on.update = (_, count) => {
-      if (count === 1) throw refusal("SERVER_BUSY", {}, Code.ResourceExhausted, 900);
+      if (count === 1) throw refusal("SERVER_BUSY", {}, Code.ResourceExhausted, 30_000);
     };
     session.move("tip", at(1));
     await server.until(() => server.updates.length === 1);
@@ -303,7 +303,7 @@ describe("a session that is taken over", () => {
     const start = performance.now();
     await session.takeOver();
     await server.until(() => server.updates.length === 2);
-    expect(performance.now() - start).toBeLessThan(500);
+    expect(performance.now() - start).toBeLessThan(15_000);
     expect(server.updates[1]!.writerToken).toBe("another");
   });
 });

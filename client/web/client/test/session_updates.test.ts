@@ -251,15 +251,15 @@ describe("a part of an upload that the server has no room for yet", () => {
   test("is waited for no more once the caller has enough of it", async () => {
     const server = new FakeServer();
     server.on.part = () => {
-      throw refusal("UPLOAD_RATE", {}, Code.ResourceExhausted, 900);
+      throw refusal("UPLOAD_RATE", {}, Code.ResourceExhausted, 30_000);
     };
     const enough = new AbortController();
-    const opening = openWith(server.rpc(20_000), large, { signal: enough.signal });
+    const opening = openWith(server.rpc(60_000), large, { signal: enough.signal });
     const start = performance.now();
     await server.until(() => server.parts.length === 1);
     enough.abort();
     await expect(opening).rejects.toMatchObject({ code: "cancelled" });
-    expect(performance.now() - start).toBeLessThan(500);
+    expect(performance.now() - start).toBeLessThan(15_000);
   });
 });
 

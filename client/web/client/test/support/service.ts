@@ -143,7 +143,7 @@ export class Service {
       stdio: "ignore",
       env: { ...process.env, ...this.#envoyEnvironment },
     });
-    for (let tries = 0; tries < 200; ++tries) {
+    for (const end = performance.now() + 60_000; performance.now() < end;) {
       try {
         const admin = readFileSync(adminFile, "utf8");
         const web = execFileSync(process.execPath, [join(root, "deploy/envoy-ready.mjs"), admin], {

@@ -6,7 +6,7 @@ import type { Shape } from "../model/blend.js";
 import { type Moment, momentsOf, shapeAt } from "../model/film.js";
 import { drawnAt } from "lpdeform-client/mesh/drawmesh";
 import type { App } from "./app.js";
-import { secondsEach } from "./player.js";
+import { mostSecondsAtOnce, secondsEach } from "./player.js";
 
 /** Shapes that are solved from one pose to the next. */
 const steps = 6;
@@ -161,15 +161,16 @@ function nextPicture(app: App): Promise<void> {
 /** With pictures at rest before and after. Ends early if another mesh is opened. Rejects with the signal's reason. */
 function play(app: App, shapes: readonly Shape[], seconds: number, signal: AbortSignal): Promise<void> {
   const { mesh } = app;
-  const begin = performance.now();
+  let [at, last] = [-restSeconds, performance.now()];
   return new Promise((resolve, reject) => {
     const step = (now: number) => {
       if (signal.aborted) return reject(signal.reason as LpdeformError);
-      const at = (now - begin) / 1000 - restSeconds;
+      at += Math.min(Math.max(now - last, 0) / 1000, mostSecondsAtOnce);
+      last = now;
       if (at > seconds + restSeconds || app.mesh !== mesh) return resolve();
       app.preview(shapeAt(shapes, (at / seconds) * (shapes.length - 1)));
       requestAnimationFrame(step);
     };
-    step(begin);
+    step(last);
   });
 }

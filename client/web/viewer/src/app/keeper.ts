@@ -128,6 +128,13 @@ export class Keeper {
     this.#hasPutOff = true;
   }
 
+  /** From now on this work is the tab's, and not the one that was put off. */
+  #takeTab(): void {
+    if (!this.#hasPutOff) return;
+    sessionStorage.setItem(key, this.#id);
+    this.#hasPutOff = false;
+  }
+
   /** Removes old or excessive works, but none that a tab has open, including this one. */
   async #makeRoom(store: Store, works: readonly Work[]): Promise<void> {
     const old = works.filter(({ savedAt }, k) => k >= mostWorks || savedAt < Date.now() - oldestMs);
@@ -216,11 +223,13 @@ export class Keeper {
           ? isNew
           : await Promise.all(isNew.map(async ([mesh, key]) => [await storedOf(mesh), key] as const));
         if (number !== this.#saves) return; // the page was left meanwhile, with what is newest
-        await this.#store!.put({ ...work, view: { ...view, ...kept.view }, asides: asides.map(withoutMesh) }, newMeshes);
-        if (this.#hasPutOff) {
-          sessionStorage.setItem(key, this.#id);
-          this.#hasPutOff = false;
-        }
+        const stored = this.#store!.put(
+          { ...work, view: { ...view, ...kept.view }, asides: asides.map(withoutMesh) },
+          newMeshes,
+        );
+        if (isLeaving) this.#takeTab(); // nothing runs after a wait in a page that is left
+        await stored;
+        this.#takeTab();
       } else {
         await this.#store!.remove([this.#id]);
       }

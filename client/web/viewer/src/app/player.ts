@@ -6,7 +6,7 @@ import type { App } from "./app.js";
 /** From one pose to the next. */
 export const secondsEach = 1.5;
 /** However slowly the page draws, what lies between two poses is seen. */
-const mostSecondsAtOnce = 0.1;
+export const mostSecondsAtOnce = 0.1;
 
 /** Plays the poses one after the other. The server solves for what is between them. All of it is one step, and Escape reverts it. */
 export class Player {

@@ -149,7 +149,7 @@ it("an OBJ file keeps what it has beside where it is saved as such, and it is sa
     { name: "Top", vertices: [4, 5, 6, 7], translate: [0, 0, 2] },
   ];
   await drop({ "handles.json": JSON.stringify({ handles }) });
-  await user.settled();
+  await user.handlesCame("Top");
   const saved = (await user.save("Mesh as OBJ")).toString();
   expect(saved).toContain(beside);
   expect(saved).toContain(`f ${faces[0]!.join(" ")}\n`);
@@ -177,7 +177,7 @@ it("a PLY is saved as PLY with its texture coordinates, and as another format it
     { name: "Top", vertices: [4, 5, 6, 7], translate: [0, 0, 2] },
   ];
   await drop({ "handles.json": JSON.stringify({ handles }) });
-  await user.settled();
+  await user.handlesCame("Top");
   const saved = (await user.save("Mesh as PLY, with distortion")).toString().split("\n");
   expect(saved.slice(3, 9)).toEqual([...head, "property float distortion"]);
   expect(saved.slice(11, 20).map((row) => row.split(" ").slice(0, 5).join(" "))).toEqual(

@@ -13,6 +13,18 @@ beforeAll(async () => {
   await user.page.locator("summary", { hasText: "Poses" }).click();
 });
 
+/** Does this in the page soon after the recording of a video has begun: it is over after two seconds, however long a test is busy. */
+const whenRecording = (act: string) =>
+  user.page.evaluate(`{
+    const notice = document.querySelector(".notice");
+    const look = new MutationObserver(() => {
+      if (!notice.textContent.includes("Recording the poses… Escape stops it.")) return;
+      look.disconnect();
+      setTimeout(() => ${act}, 100);
+    });
+    look.observe(notice, { childList: true, characterData: true, subtree: true });
+  }`);
+
 const keep = () => user.page.getByRole("button", { name: "Keep this pose" }).click();
 
 it("without two poses there is nothing to export, which is said", async () => {
@@ -53,12 +65,11 @@ it("poses are exported as morph targets, solved in between, and validated", asyn
 });
 
 it("Escape ends the recording of a video, and the picture shows the work again", async () => {
-  await user.page.getByRole("button", { name: "Save" }).click();
-  await user.page.getByRole("menuitem", { name: "Poses as video" }).click();
-  await user.page.locator(".notice", { hasText: "Recording the poses… Escape stops it." }).waitFor();
   const downloads: string[] = [];
   user.page.on("download", (one) => downloads.push(one.suggestedFilename()));
-  await user.page.keyboard.press("Escape");
+  await whenRecording(`window.dispatchEvent(new KeyboardEvent("keydown", { code: "Escape", key: "Escape" }))`);
+  await user.page.getByRole("button", { name: "Save" }).click();
+  await user.page.getByRole("menuitem", { name: "Poses as video" }).click();
   await user.page.locator(".notice.bad", { hasText: "The poses were not exported. Escape was pressed." }).waitFor();
   expect(downloads).toEqual([]);
   await user.settled();
@@ -116,10 +127,9 @@ it("poses are recorded as a video of the picture, whose last picture is the last
 it("nothing is saved if another mesh is opened while the video is recorded", async () => {
   let downloads = 0;
   user.page.on("download", () => ++downloads);
+  await whenRecording(`void window.__lpdeform.app.openShape("sheet", "coarse")`);
   await user.page.getByRole("button", { name: "Save" }).click();
   await user.page.getByRole("menuitem", { name: "Poses as video" }).click();
-  await user.page.locator(".notice", { hasText: "Recording" }).waitFor({ timeout: 60_000 });
-  await user.ask(`app.openShape("sheet", "coarse")`);
   await user.page.locator(".notice.bad", { hasText: "The work has changed" }).waitFor();
   await user.settled();
   expect(downloads).toBe(0);
@@ -131,6 +141,7 @@ it("what the file of the mesh also had is not in a GLB of its poses, and the pag
   const ends = [0, rows].map((row) => Array.from({ length: columns + 1 }, (_, column) => row * (columns + 1) + column));
   const handles = ends.map((vertices, k) => ({ name: `end ${k}`, vertices }));
   await user.openFiles({ name: "h.json", content: JSON.stringify({ handles }) });
+  await user.handlesCame("end 1");
   await keep();
   await keep();
   await user.save("Poses as GLB, with morph targets");

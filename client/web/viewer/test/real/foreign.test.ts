@@ -70,7 +70,7 @@ describe("the viewer", () => {
         { name: "tip", vertices: where(13), translate: [2, 0, 0] },
       ];
       await user.openFiles({ name: "tube.json", content: JSON.stringify({ handles }) });
-      await user.settled();
+      await user.handlesCame("tip");
       const saved = new Uint8Array(await user.save("Mesh as GLB"));
       expect(await faultsOf(saved)).toEqual([]);
       const bent = parseMesh("a.glb", saved);

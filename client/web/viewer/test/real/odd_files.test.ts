@@ -30,7 +30,9 @@ async function drop(files: Record<string, string | Uint8Array>): Promise<{ text:
     window.before = [app.mesh, app.document];
   })()`);
   await user.drop(...paths);
-  await user.until("(({ notice }) => notice && !notice.stays)(window.__lpdeform.app.facts.now)");
+  await user.until(
+    "(({ notice }) => notice && !notice.stays && !/overloaded/.test(notice.text))(window.__lpdeform.app.facts.now)",
+  );
   const { text, isBad } = await user.ask<{ text: string; isBad: boolean }>("app.facts.now.notice");
   const isSame = await user.page.evaluate(
     "(({ mesh, document }) => window.before[0] === mesh && window.before[1] === document)(window.__lpdeform.app)",

@@ -49,11 +49,21 @@ it("poses are kept, gone to and played with the solver filling in, as one step; 
 
   await button("Play").click();
   await user.until("window.__lpdeform.document().handles[1].pose.translation[0] !== 0");
+  await user.page.evaluate(`{
+    const held = [];
+    const { requestAnimationFrame } = window;
+    window.requestAnimationFrame = (step) => held.push(step); // it plays on once it is asked to
+    window.playOn = () => {
+      window.requestAnimationFrame = requestAnimationFrame;
+      for (const step of held) requestAnimationFrame(step);
+    };
+  }`);
   const saved = await user.downloaded(() => user.page.keyboard.press("Control+s"));
   const { document } = await readProject("a.lpdeform", new Uint8Array(saved));
   expect(document.handles[1]!.pose.translation).toEqual([0, 0, 0]);
   expect(await button("Stop").isVisible()).toBe(true);
   await user.page.keyboard.press("Escape");
+  await user.page.evaluate("window.playOn()");
   await button("Play").waitFor();
   expect(await moved()).toEqual([0, 0, 0]);
   await button("Delete Pose 1").click();

@@ -35,7 +35,9 @@ it("each that is dropped onto the page is opened and taken by the server, or ref
     })()`);
     const others = /\.(gltf|obj)$/i.test(name) ? [...beside.keys()].filter((other) => !isModel(other)) : [];
     await user.drop(pathOf(path), ...others.map((other) => pathOf(join(path, "..", other))));
-    await user.until("(({ notice }) => notice && !notice.stays)(window.__lpdeform.app.facts.now)");
+    await user.until(
+      "(({ notice }) => notice && !notice.stays && !/overloaded/.test(notice.text))(window.__lpdeform.app.facts.now)",
+    );
     const { text, isBad } = await user.ask<{ text: string; isBad: boolean }>("app.facts.now.notice");
     const isKept = await user.page.evaluate<boolean>(
       "(({ mesh, document }) => window.before[0] === mesh && window.before[1] === document)(window.__lpdeform.app)",

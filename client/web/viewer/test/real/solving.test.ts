@@ -57,8 +57,8 @@ it("what is left goes down from frame to frame, and then it is settled", async (
 });
 
 it("nothing is said of a solve while the server is away", async () => {
-  await user.ask("app.facts.set({ solving: { left: 0.4 } })");
-  expect(await user.page.locator(".pill").innerText()).toMatch(/40/);
+  const told = `(window.__lpdeform.app.facts.set({ solving: { left: 0.4 } }), document.querySelector(".pill").innerText)`;
+  expect(await user.page.evaluate(told)).toMatch(/40/);
   await service.killServer();
   await user.until(`document.querySelector(".pill").innerText.trim() === "The server is away"`);
   expect(await user.page.locator(".pill .left").innerText()).toBe("");

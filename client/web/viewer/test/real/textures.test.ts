@@ -54,7 +54,7 @@ it("the texture of a GLB is shown where the file has it, and bends with the surf
     ],
   };
   await user.openFiles({ name: "h.json", content: JSON.stringify(handles) });
-  await user.settled();
+  await user.handlesCame("top");
   const before = await at(3);
   await user.page.locator('[data-handle="top"] .name').click();
   await user.page.getByLabel("Moved along x").fill("1.5");

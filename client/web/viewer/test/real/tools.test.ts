@@ -128,7 +128,7 @@ describe("points inside faces, from a file", () => {
       return faces.slice(first, first + 3).every((vertex) => mesh.positions[3 * vertex + 1] === mesh.positions[3 * front + 1]);
     }
     await user.openFiles({ name: "pin.json", content: content.replace('"face":0', `"face":${face}`) });
-    await user.settled();
+    await user.handlesCame("Pin");
     await press("1");
     await press("Escape"); // without the gizmo over it
     const start = await onPage(await place());

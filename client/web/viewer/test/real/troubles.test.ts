@@ -31,18 +31,20 @@ const banner = (user: User, words: string | RegExp, timeout = 30_000) =>
 
 /**
  * Starts a clock in the page that goes on by a tenth of a second at most while the page does not get the processor, which it shares with
- * other tests. The returned function tells how many milliseconds it shows.
+ * other tests, and stops when the banner says this. The returned function tells how many milliseconds it shows.
  */
-async function startClock({ page }: User): Promise<() => Promise<number>> {
-  await page.evaluate(() => {
+async function startClock({ page }: User, until: RegExp): Promise<() => Promise<number>> {
+  await page.evaluate((text) => {
+    const banner = document.querySelector<HTMLElement>(".banner")!;
     const clock = { shows: 0, ticked: performance.now() };
     Object.assign(window, { __clock: clock });
-    setInterval(() => {
+    const timer = setInterval(() => {
       const now = performance.now();
       clock.shows += Math.min(now - clock.ticked, 100);
       clock.ticked = now;
+      if (!banner.hidden && new RegExp(text).test(banner.textContent)) clearInterval(timer);
     }, 10);
-  });
+  }, until.source);
   return () => page.evaluate<number>("window.__clock.shows");
 }
 
@@ -102,7 +104,7 @@ describe("the page says plainly, and goes on by itself when", () => {
         await mouse.move(x, y);
         await mouse.down();
       }
-      const clock = await startClock(user);
+      const clock = await startClock(user, stopped);
       service.pause(part);
       let isOver = false;
       const said = banner(user, stopped, 20_000).finally(() => (isOver = true));

@@ -146,6 +146,12 @@ export class User {
     await (await chooser).setFiles(payload);
   }
 
+  /** Until the handles of a file that was opened are there, this one last, and what they make of the shape is on the screen. */
+  async handlesCame(last: string): Promise<void> {
+    await this.until(`window.__lpdeform.document().handles.at(-1)?.name === ${JSON.stringify(last)}`);
+    await this.settled();
+  }
+
   async save(entry: string): Promise<Buffer> {
     await this.page.getByRole("button", { name: "Save" }).click();
     return await this.downloaded(() => this.page.getByRole("menuitem", { name: entry }).click());

@@ -77,7 +77,7 @@ it("a page that is left for good takes its session with it", async () => {
     );
   expect(await code()).toBe("there");
   await leaving.page.goto("about:blank");
-  await expect.poll(code, { timeout: 5000 }).toBe("not_found");
+  await expect.poll(code).toBe("not_found");
   await leaving.close();
 });
 
