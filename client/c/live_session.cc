@@ -326,8 +326,8 @@ absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::settle(double timeout
   for (;;) {
     {
       const std::scoped_lock lock(frame_mutex_);
-      // Asked before the box is looked into: if the last frame is the result only because a newer update was refused,
-      // the refusal is in the box by now, and is returned first.
+      // is_result() is asked before the box is read: if the last frame is the result only because a newer update was
+      // refused, the box has the refusal by now, and take_newest() returns it.
       const bool is_settled = last_frame_ && (*live)->is_result(*last_frame_);
       const absl::StatusOr<bool> taken = take_newest(**live);
       if (!taken.ok()) return taken.status();

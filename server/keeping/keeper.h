@@ -123,7 +123,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   };
 
   /// Waits, before the process ends, until everything is stored, and retries while the store fails, until
-  /// `end`. After `end` no store call is begun or awaited. Callers who wait for it, or come later,
+  /// `end`. After `end` no change is written and no store call is awaited. Callers who wait for it, or come later,
   /// are told STORE_FAILING, or that their update is not kept. Returns what is not stored. The log has a line
   /// for each such session.
   std::vector<Unkept> flush(std::chrono::steady_clock::time_point end);
@@ -186,6 +186,7 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   static void fill_in(Work& work);
   static void refill(Work& work);
   void write(std::vector<Work> works, bool is_all);
+  absl::Status check_end() const;
   absl::StatusOr<std::vector<ChangeOutcome>> commit(std::span<const Work> works);
   static std::size_t bytes_of(std::span<const Work> works);
   void write_all(Entry& entry, const std::string& name);

@@ -131,7 +131,7 @@ void Keeper::write(std::vector<Work> works, bool is_all) {
   }
   {
     const std::scoped_lock lock(mutex_);
-    note_written(health, is_all);
+    if (!is_over_) note_written(health, is_all);
   }
   make(calls);
 }
@@ -146,20 +146,26 @@ std::size_t Keeper::bytes_of(std::span<const Work> works) {
   return bytes;
 }
 
+/// Fails once flush() has told what is not stored.
+absl::Status Keeper::check_end() const {
+  const std::scoped_lock lock(mutex_);
+  return is_over_ ? store_failing(kEnds) : absl::OkStatus();
+}
+
 absl::StatusOr<std::vector<ChangeOutcome>> Keeper::commit(std::span<const Work> works) {
   std::vector<StoredChange> changes;
   const Clock::time_point begin = Clock::now();
   absl::Status status;
-  {
-    const std::scoped_lock lock(mutex_);
-    if (is_over_) return store_failing(kEnds);  // flush() has told what is not stored
-  }
   const StoreCalls::UnderWay call(calls_, begin, bytes_of(works));
   for (const Work& work : works) {
     changes.push_back(work.change);
     status.Update(work.status);
-    for (const auto& [key, bytes] : work.blobs) status.Update(store_->keep_blob(work.name, key, bytes));
+    for (const auto& [key, bytes] : work.blobs) {
+      status.Update(check_end());
+      if (status.ok()) status.Update(store_->keep_blob(work.name, key, bytes));
+    }
   }
+  status.Update(check_end());
   auto outcomes = status.ok() ? store_->commit(changes) : status;
   services_.metrics->observe(Span::kStoreWrite, seconds_since(begin));
   if (!outcomes.ok()) services_.metrics->add(Count::kStoreErrors);

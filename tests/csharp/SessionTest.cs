@@ -444,7 +444,7 @@ static class SessionTest
             session.SetSolver(new SolverSettings { Search = new MinimaSearch { Effort = 1, LeastShare = 0.5 } });
             var positions = new float[66];
             session.Settle(positions);
-            // Of the load of this machine there may be one.
+            // There may be a notice about the load of this machine.
             Expect(session.Notice.Reason != NoticeReason.BetterShape && session.Notice.SavedShare == 0, "there is none");
             Refused("NO_BETTER_SHAPE", () => session.TakeBetterShape());
             session.SetSolver(new SolverSettings { Search = new MinimaSearch { Effort = 1001 } });

@@ -101,8 +101,8 @@ class Attacker:
         return self.settings[setting]
 
     def fill(self, streams, size, seconds, method=b"UploadPart", least=0):
-        """Sends messages that say they have `size` bytes and lack the last, as far as windows let it, for so long and until
-        so many bytes are sent at least; the bytes sent."""
+        """Sends messages that announce `size` bytes and lack the last one, as far as the windows allow. Goes on for `seconds`, and
+        until `least` bytes are sent. Returns the bytes sent."""
         sent, heads = 0, {}
         for stream in streams:
             heads[stream] = b"\0" + struct.pack(">I", size)

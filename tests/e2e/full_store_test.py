@@ -89,7 +89,7 @@ class Client:
                          update=update).result.kept
 
     def keep_p(self, session, input_seq, p):
-        """Whether the store takes it. Asks again where the server answered before the store did."""
+        """Whether the store takes the update. Sends it again if the server answered before the store."""
         end = time.monotonic() + programs.PATIENCE
         while True:
             begin = time.monotonic()
@@ -215,7 +215,7 @@ class FullDisk(OfServers):
             for session in sessions:
                 field = [value + (input_seq - 1) / 10 for value in values]
                 kept.setdefault(session.session.name, []).append(client.keep_p(session, input_seq, field))
-        for session in sessions:  # an earlier answer may have been overtaken by a further try
+        for session in sessions:  # the store may have taken it at a later try
             kept[session.session.name][-1] = client.keep_p(session, 5, [value + 4 / 10 for value in values])
         lost = {name[len("sessions/"):][:8]: answers for name, answers in kept.items() if not answers[-1]}
         self.assertTrue(lost, kept)

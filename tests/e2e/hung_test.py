@@ -4,6 +4,7 @@ and with a Redis.
 Run as: FILE SERVER CLI [unittest arguments], by the Python that has the client (build/python).
 """
 
+import contextlib
 import http.client
 import os
 import struct
@@ -201,7 +202,7 @@ class HungServer(unittest.TestCase):
             drag.end()
 
     def longest_of_drags(self):
-        """For how long a drag stood still when its server hung, and how many came to the other server."""
+        """Returns the longest standstill of a drag when its server hangs, and how many drags went on at the other server."""
         drags = [self.drag_at(kind, self.servers[0]) for kind in (Native, Page)]
         for drag in drags:
             drag.thread.start()
@@ -221,6 +222,7 @@ class HungServer(unittest.TestCase):
                 self.doCleanups()
                 self.setUp()
             longest, moved = self.longest_of_drags()
+            print(f"round {number}: {longest:.2f} s, {moved} drags went on at the other server", flush=True)
             if longest < LONGEST and moved == 2:
                 break
         self.assertLess(longest, LONGEST)
@@ -228,18 +230,28 @@ class HungServer(unittest.TestCase):
 
     def test_a_quiet_stream_is_not_taken_for_a_hung_one(self):
         """A server ends a connection that brings it pings more often than it likes, where nothing else is sent: gRPC's default is five
-        minutes."""
+        minutes. A server that is held up for over a second does look hung. One round in which it is not is enough."""
         server = programs.RunningServer("--heartbeat", "4")
         self.addCleanup(server.stop)
+        for _ in range(ROUNDS):
+            seen = self.quiet_stream(server)
+            if seen == ("opened", "heartbeat", 1):
+                break
+        self.assertEqual(seen, ("opened", "heartbeat", 1))
+
+    def quiet_stream(self, server):
+        """Returns the first and the fourth event of a stream in which nothing happens, and how many connections Envoy has made. The
+        events that do not come are None."""
         envoy = Envoy("--server", server.address)
         self.addCleanup(envoy.stop)
         request_fuzz.wait_until_reached(envoy)
         page = Page(envoy.port)
         self.addCleanup(page.close)
-        events = iter(page.next_of_stream, None)
-        kinds = [next(events).WhichOneof("event") for _ in range(4)]
-        self.assertEqual((kinds[0], kinds[-1]), ("opened", "heartbeat"))
-        self.assertEqual(envoy.stats()["cluster.lpdeform.upstream_cx_total"], 1)
+        kinds = [None] * 4
+        with contextlib.suppress(ConnectionError):
+            for number in range(4):
+                kinds[number] = page.next_of_stream().WhichOneof("event")
+        return kinds[0], kinds[-1], envoy.stats()["cluster.lpdeform.upstream_cx_total"]
 
 
 if __name__ == "__main__":

@@ -131,7 +131,7 @@ class Streams(Log):
         ended = self.next_end(server)
         self.assertEqual((ended["reason"], ended["session"]), ("cancelled", self.digits(session)))
 
-        # The client takes a call back whose time is over: a server that gets no core just then sees only that.
+        # When a call's time is over, the client cancels it, too. A server that is held up may see only that.
         ends = collections.Counter(["cancelled"])
         while not ends["deadline"]:
             self.assertLess(ends.total(), 10)

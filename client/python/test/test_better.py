@@ -60,11 +60,13 @@ def better(session: lpdeform.Session) -> bool:
 
 
 def lower_than(first: lpdeform.Frame, session: lpdeform.Session) -> lpdeform.Frame:
-    """The next frame whose energy is lower by the least share at least: others may come again before it."""
+    """The next final frame whose energy is lower by at least the least share. Others may come before it."""
     end = time.monotonic() + PATIENCE
-    while (shown := session.next_frame(PATIENCE)).energy > 0.999 * first.energy:
+    while True:
+        shown = session.next_frame(PATIENCE)
+        if shown.is_final and shown.energy <= 0.999 * first.energy:
+            return shown
         assert time.monotonic() < end
-    return shown
 
 
 def test_a_session_in_which_nothing_changes_announces_a_better_shape_which_is_taken_once(place: Place) -> None:

@@ -39,7 +39,7 @@ def test_what_the_server_says_about_itself_is_logged_and_there_while_its_stream_
     stream = link._stream
     assert stream is not None
     with link.changed:
-        stream.server_notice = None  # one about the load of this machine
+        stream.server_notice = None  # there may be one about the load of this machine
         assert session.notice is None
     caplog.set_level("INFO", "lpdeform")
     said = (
@@ -50,7 +50,7 @@ def test_what_the_server_says_about_itself_is_logged_and_there_while_its_stream_
     for number, reason, level in said:
         notice = service_pb2.Notice(reason=number, text="Of its own.")  # type: ignore[arg-type]
         event = service_pb2.StreamEvent(notice=notice)
-        with link.changed:  # the server's notices wait
+        with link.changed:  # so no notice of the server itself comes in between
             link._take(stream, [], service_pb2.DeformResponse(event=event))
             assert session.notice == lpdeform.Notice(reason, "Of its own.")  # type: ignore[arg-type]
         ours = [one for one in caplog.records if one.getMessage() == f"{server.address}: Of its own."]
@@ -83,7 +83,7 @@ def test_a_better_shape_is_announced_until_a_frame_shows_it_or_a_later_update(re
         stream.shown(lpdeform.Frame(FrameHeader(input_seq=input_seq, energy=energy)))
         return session.notice and session.notice.reason
 
-    with link.changed:  # the server's notices wait
+    with link.changed:  # so no notice of the server itself comes in between
         stream.server_notice = None
         assert after_frame(8, 9.0) is None
         say(service_pb2.NOTICE_REASON_OVERLOADED)

@@ -6,6 +6,6 @@ export default defineConfig({
     testTimeout: 120_000,
     hookTimeout: 120_000,
     fileParallelism: false,
-    expect: { poll: { timeout: 30_000 } }, // instead of one second, which a single look at the page can take
+    expect: { poll: { timeout: 30_000 } }, // the default of one second may pass during a single look at the page
   },
 });

@@ -141,7 +141,7 @@ TEST_F(LyingServerTest, AFrameOfAnotherMeshIsDroppedAndSaidByTheState) {
   EXPECT_TRUE(eventually([&] {
     const lpdeform_code code = lpdeform_poll(session_, &buffers, nullptr, &error_);
     EXPECT_TRUE(code == LPDEFORM_NO_FRAME || code == LPDEFORM_DATA_LOSS)
-        << error_.message;  // after some tries
+        << error_.message;  // DATA_LOSS after some tries
     return state() != LPDEFORM_STATE_LIVE && std::string(error_.reason) == "FRAME_PARTS";
   }));
   EXPECT_EQ(error_.code, LPDEFORM_DATA_LOSS);

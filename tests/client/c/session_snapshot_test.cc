@@ -55,7 +55,7 @@ TEST_F(CSnapshotTest, ComesBackTheSameWithItsStepsAndIsRecreatedFromItsFile) {
   hold("base", {0, 1});
   hold("tip", {20, 21}, shift(0, 1, 0));
   settle(22);
-  lift(2);    // one drag with the next, which comes within a second
+  lift(2);    // one step with the next, which comes within a second
   lift(2.5);  // not waited for, and in the file all the same
   const std::string file = snapshot();
   EXPECT_EQ(settle(22)[20][1], 2.5);  // the session goes on

@@ -154,7 +154,7 @@ TEST_F(GeometryTest, OthersAreAnsweredWhileTheGeometryOfALargeMeshIsLookedAt) {
   std::uint64_t seq = 0;
   bool are_others_first = false;
   for (int tries = 0; tries < 10 && !are_others_first;
-       ++tries) {  // this thread may get no turn for as long as it takes
+       ++tries) {  // they may be over before this thread gets a turn
     const auto large = create(necked_bar(60, 80, 20, 20));
     const UpdatesUnderWay updates(*stub_, large, 8);  // more than the pool has threads
     for (int k = 0; k < 20; ++k) ASSERT_TRUE(update(small, ends_message(bar_mesh().vertices, ++seq, 1)).ok());

@@ -172,7 +172,7 @@ class CrowdedSolveTest : public SolveByManualTimeTest {
  protected:
   void SetUp() override {
     options_.runner_threads = 2;
-    options_.session_idle = std::chrono::hours(24 * 365);
+    options_.session_idle = options_.upload_idle = std::chrono::hours(24 * 365);
     SolveByManualTimeTest::SetUp();
   }
 };
@@ -184,7 +184,8 @@ TEST_F(CrowdedSolveTest, SaysThatItIsThereWhileItWaitsForAThreadAndIsSetUp) {
   });
   const TriangleMesh large = box_surface(40, 40, 160);  // set up in some 100 ms
   bool say_all = false;
-  for (int tries = 0; tries < 10 && !say_all; ++tries) {  // the clock may get no turn for as long
+  for (int tries = 0; tries < 10 && !say_all;
+       ++tries) {  // the clock's thread may get no turn during the set-up
     std::vector<v1::SolveRequest> requests;
     for (int k = 0; k < 3; ++k) {
       requests.push_back(solve_request(create(large)));

@@ -97,7 +97,7 @@ TEST_F(StreamTest, UnaryCallsAndAFrameStreamDoWhatDeformDoes) {
   ASSERT_TRUE(update(session, ends_message(rest(), 1, 2)).ok());
   for (bool is_answered = false; !is_answered;) {
     ASSERT_TRUE(stream->Read(&response));
-    if (response.event().has_notice()) continue;  // that the server has much to do
+    if (response.event().has_notice()) continue;  // a notice that the server has much to do
     ASSERT_TRUE(response.event().has_frame());
     const v1::FrameHeader& header = response.event().frame().header();
     is_answered = header.input_seq() == 1 && header.is_final();
@@ -368,7 +368,7 @@ TEST_F(ManualTimeTest, SilentStreamsSaySomethingNowAndThen) {
   const auto session = create(bar_mesh());
   DeformClient client(*stub_, session);
   ASSERT_TRUE(client.next_frame(false));
-  // What is to be done at a time that has just passed is done, too.
+  // Runs what was scheduled for a moment that has just passed.
   const std::jthread clock([this](const std::stop_token& stop) {
     for (; !stop.stop_requested(); std::this_thread::sleep_for(std::chrono::milliseconds(5)))
       timers_->advance(std::chrono::seconds(0));

@@ -257,8 +257,7 @@ class KeeperTest : public testing::Test {
 
   bool shows(const std::string& line) const { return absl::StrContains(metrics_->text(), line + "\n"); }
 
-  /// Lets time go by until something was asked for. Where the keeper's threads get no turn, a minute of the test's time
-  /// takes at least six seconds, so that no sweep comes between.
+  /// Lets time pass until something was asked for, at most ten times as fast as real time.
   bool pass_until(const std::string& asked) {
     const auto end = std::chrono::steady_clock::now() + kPatience;
     while (!store_->wait_for(asked, 1, std::chrono::milliseconds(1))) {
@@ -268,8 +267,7 @@ class KeeperTest : public testing::Test {
     return true;
   }
 
-  /// Lets time go by until the store is told what the keeper has now, and forgets what it was told before. A touch that is
-  /// under way may have looked earlier.
+  /// Lets time pass until a touch tells the store what the keeper has now. It waits for two, because the first may have looked before.
   void pass_a_touch() {
     for (int k = 0; k < 2; ++k) {
       store_->forget();
@@ -607,12 +605,11 @@ TEST_F(KeeperTest, TheEndAnswersAllWhoWaitForAStoreThatHangs) {
   EXPECT_TRUE(left[0].is_removal);
   for (const auto& one : left) EXPECT_NE(one.name, kName + "c");  // nobody was told that it is there
   keeper_->remove(all[2]->name(), [&](const absl::Status& status) { removed_late.set_value(status); });
-  constexpr std::chrono::seconds kSoon{10};
   for (auto* const answer : {&is_removed, &is_added, &is_removed_late}) {
-    ASSERT_EQ(answer->wait_for(kSoon), std::future_status::ready);
+    ASSERT_EQ(answer->wait_for(kPatience), std::future_status::ready);
     EXPECT_EQ(fault_of(answer->get()).reason, "STORE_FAILING");
   }
-  ASSERT_EQ(is_kept.wait_for(kSoon), std::future_status::ready);
+  ASSERT_EQ(is_kept.wait_for(kPatience), std::future_status::ready);
   EXPECT_FALSE(is_kept.get());
 }
 

@@ -228,8 +228,6 @@ TEST_F(RestartTest, OneMeshOfManySessionsIsStoredOnce) {
 }
 
 TEST_F(RestartTest, ASessionThatNobodyUsesGoesFromTheStoreToo) {
-  timers_ = std::make_shared<ManualTimers>();
-  restart();
   const auto session = create(bar_mesh());
   timers_->advance(options_.session_idle + std::chrono::seconds(1));
   restart();

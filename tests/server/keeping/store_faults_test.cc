@@ -25,15 +25,6 @@ class StoreFaultsTest : public RestartTest {
     return request;
   }
 
-  /// Repeats an update, which changes nothing, until it is kept: a store can be too slow for the answer.
-  bool keeps(const v1::CreateSessionResponse& session, const v1::Update& update) {
-    const auto end = std::chrono::steady_clock::now() + kTestDeadline;
-    while (!take(session, update).kept()) {
-      if (std::chrono::steady_clock::now() > end) return false;
-    }
-    return true;
-  }
-
   /// Sends updates until one is kept again; the store has recovered then.
   std::uint64_t until_kept(const v1::CreateSessionResponse& session, std::uint64_t seq) {
     const auto end = std::chrono::steady_clock::now() + kTestDeadline;

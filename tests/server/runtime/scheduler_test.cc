@@ -149,23 +149,23 @@ TEST(Scheduler, RefinementsKeepAShareBesideEndlessAnswers) {
   OneThread one;  // after what its jobs use: one may run yet
   for (int k = 0; k < 3; ++k) {
     answering.push_back(std::make_shared<Job>(false, [&, k] {
-      spin(std::chrono::milliseconds(1));  // a thread that is held up for long counts for few slices
+      spin(std::chrono::milliseconds(1));  // a thread that is held up counts as few of them
       ++answers;
       one.scheduler.wake(answering[static_cast<std::size_t>(k)],
                          Urgency::kAnswer);  // the next update is there
-      return answers < 3000;
+      return answers < 15000;
     }));
   }
   const auto refining = std::make_shared<Job>(false, [&] {
     spin(std::chrono::milliseconds(1));
-    if (++refinements == 200) done.set_value();
-    return refinements < 200;
+    if (++refinements == 1000) done.set_value();
+    return refinements < 1000;
   });
   for (const auto& job : answering) one.scheduler.wake(job, Urgency::kAnswer);
   one.scheduler.wake(refining);
   done.get_future().wait();
-  EXPECT_GT(answers, 200);   // three quarters of the time are theirs
-  EXPECT_LT(answers, 3000);  // and no more
+  EXPECT_GT(answers, 1000);   // three quarters of the time are theirs
+  EXPECT_LT(answers, 15000);  // and no more
 }
 
 TEST(Scheduler, AHeavierWeightHasALargerShare) {
@@ -240,10 +240,11 @@ TEST(Scheduler, IdleSlicesWaitForAllOthersAndAreNoOverload) {
   std::promise<void> idle_runs, ended;
   std::atomic<int> idle = 0, ordinary = 0;
   std::atomic<int> idle_meanwhile = 0;
+  std::atomic<int> awake = 0;
+  std::array<bool, 3> are_awake{};
   {
     Scheduler scheduler(2);
     // Three that always have something to do on two threads: one of them always waits.
-    std::atomic<int> awake = 0;
     const auto busy = [&](bool& is_awake) {
       spin(std::chrono::milliseconds(2));
       if (!std::exchange(is_awake, true)) ++awake;
@@ -265,9 +266,8 @@ TEST(Scheduler, IdleSlicesWaitForAllOthersAndAreNoOverload) {
       return true;
     }));
     idle_runs.get_future().wait();
-    std::array<bool, 3> are_awake{};
     for (bool& is_awake : are_awake)
-      scheduler.wake(std::make_shared<Job>(false, [&] { return busy(is_awake); }));
+      scheduler.wake(std::make_shared<Job>(false, [busy, &is_awake] { return busy(is_awake); }));
     ended.get_future().wait();
     EXPECT_FALSE(scheduler.is_overloaded());
   }

@@ -222,7 +222,7 @@ class Link(Following):
             lease = self.lease
         try:
             stream.call = self._deform(stream, lease)
-            if self.is_closing or stream.stop.is_set:  # a cancel() before there was a call reached none
+            if self.is_closing or stream.stop.is_set:  # cancel() may have come before there was a call
                 stream.cancel()
             assembly: list[FrameAssembly] = []
             for response in stream.call:

@@ -18,9 +18,9 @@ beforeAll(async () => {
 });
 afterAll(() => service.stop());
 
-/** The next frame whose energy is lower by the least share at least: others may come again before it. */
+/** The next final frame whose energy is lower by at least the least share. Others may come before it. */
 async function lowerThan(first: Frame, session: Session): Promise<Frame> {
-  for await (const frame of session) if (frame.energy <= (1 - leastShare) * first.energy) return frame;
+  for await (const frame of session) if (frame.isFinal && frame.energy <= (1 - leastShare) * first.energy) return frame;
   throw new Error("no better shape came");
 }
 

@@ -95,7 +95,7 @@ test.each([1, 2])(
       { name: session.name, credit },
     );
     clearInterval(dragging);
-    // From the second half of the pause, or later. What was held on the way is from before.
+    // Fresh: it answers an update of the second half of the pause, or a later one. Frames that were held on the way are older.
     const isFresh = ({ inputSeq }: Watched) => (madeAt.get(inputSeq) ?? 0) > resumedAt - 2500;
     const first = after.findIndex(isFresh);
     expect(first).toBeGreaterThanOrEqual(0);

@@ -128,7 +128,7 @@ describe("a server with a limit of bytes a second", () => {
     let [first, bytes, tick, last, isOver] = [0, 0, 0, 0, false];
     const dragging = setInterval(() => {
       last = session.move("right", { translation: [0, 0, ++tick % 20] });
-      isOver = tick >= 150 && bytes > 5 * first; // some frames come on the way, too
+      isOver = tick >= 150 && bytes > 5 * first; // some frames must come before the last one
       if (isOver) clearInterval(dragging);
     }, 10);
     for await (const frame of reader) {

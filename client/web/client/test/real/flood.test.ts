@@ -46,14 +46,14 @@ async function flood(credit: number): Promise<{ lines: Line[]; madeAt: Map<numbe
 }
 
 test.each([1, 2, 8])(
-  "a reader of credit %i that pauses gets the newest frame as soon as it goes on",
+  "a reader of credit %i that pauses gets a fresh frame as soon as it goes on",
   async (credit) => {
     const { lines, madeAt } = await flood(credit);
     const resumed = lines.findIndex(({ resumes }) => resumes !== undefined);
     const resumedAt = lines[resumed]!.resumes!;
     const after = lines.slice(resumed + 1) as Required<Line>[];
     expect(after.length).toBe(20);
-    // Fresh is what answers an update from the second half of the pause, or a later one. What was held on the way is from before.
+    // Fresh: it answers an update of the second half of the pause, or a later one. Frames that were held on the way are older.
     const isFresh = ({ inputSeq }: Required<Line>) => (madeAt.get(inputSeq) ?? 0) > resumedAt - pauseMs / 2;
     const first = after.findIndex(isFresh);
     expect(first).toBeGreaterThanOrEqual(0);

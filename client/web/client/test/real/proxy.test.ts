@@ -219,7 +219,7 @@ test("a stream that has nothing to say but heartbeats is left alone", async () =
   await session.settle();
   const states: string[] = [];
   session.on("connection", (state) => states.push(state));
-  // A server that gets no core for too long loses connections, too: one quiet round is enough.
+  // A server that is held up loses connections, too. One quiet round of three is enough.
   for (let round = 0; round === 0 || (round < 3 && states.length > 0); ++round) {
     states.length = 0;
     await new Promise((resolve) => setTimeout(resolve, 17_000)); // Envoy's own default cuts at 15 s

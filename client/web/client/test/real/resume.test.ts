@@ -81,7 +81,7 @@ test("heartbeats keep a stream that has nothing to say", async () => {
   await session.settle({ timeoutMs: 20_000 });
   const states: string[] = [];
   session.on("connection", (state) => states.push(state));
-  // A server that gets no core for too long loses connections, too: one quiet round is enough.
+  // A server that is held up loses connections, too. One quiet round of three is enough.
   for (let round = 0; round === 0 || (round < 3 && states.length > 0); ++round) {
     states.length = 0;
     await new Promise((resolve) => setTimeout(resolve, 9000)); // dead after 6 s without them

@@ -227,7 +227,7 @@ export class Keeper {
           { ...work, view: { ...view, ...kept.view }, asides: asides.map(withoutMesh) },
           newMeshes,
         );
-        if (isLeaving) this.#takeTab(); // nothing runs after a wait in a page that is left
+        if (isLeaving) this.#takeTab(); // in a page that is being left, nothing may run after an await
         await stored;
         this.#takeTab();
       } else {

@@ -340,7 +340,7 @@ it.each(cases)("nothing covers anything at %d x %d under %s", async (width, heig
     if (all.length > 0) found[JSON.stringify(state)] = all;
   }
   const before = await one.ask("app.facts.now.status");
-  // What the server has to say meanwhile would take the place of what is said here.
+  // A message of the server would replace the texts that are shown here.
   await one.page.evaluate(`{
     const { watcher } = window.__lpdeform.app.panes[0];
     window.told = { ...watcher };

@@ -65,7 +65,7 @@ it("holds nothing of second pictures that were closed", async () => {
     return count.result.value as number;
   };
   // A session that is still being closed holds its picture.
-  await expect.poll(stages, { timeout: 10_000 }).toBe(1);
+  await expect.poll(stages, { timeout: 60_000 }).toBe(1);
   await devtools.detach();
 });
 

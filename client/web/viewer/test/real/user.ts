@@ -146,7 +146,7 @@ export class User {
     await (await chooser).setFiles(payload);
   }
 
-  /** Until the handles of a file that was opened are there, this one last, and what they make of the shape is on the screen. */
+  /** Waits until the handles of an opened file are there, whose last has this name, and the page shows their result. */
   async handlesCame(last: string): Promise<void> {
     await this.until(`window.__lpdeform.document().handles.at(-1)?.name === ${JSON.stringify(last)}`);
     await this.settled();
