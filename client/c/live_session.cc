@@ -323,15 +323,21 @@ absl::StatusOr<std::optional<lpdeform_frame>> LiveSession::settle(double timeout
   if (!live.ok()) return live.status();
   const absl::Status checked = check(buffers);
   if (!checked.ok()) return checked;
-  for (;;) {
+  for (bool is_new = false;;) {
     {
       const std::scoped_lock lock(frame_mutex_);
       // is_result() is asked before the box is read: if the last frame is the result only because a newer update was
       // refused, the box has the refusal by now, and take_newest() returns it.
       const bool is_settled = last_frame_ && (*live)->is_result(*last_frame_);
       const absl::StatusOr<bool> taken = take_newest(**live);
+      const bool has_ended = !taken.ok() && taken.status() == (*live)->ended();
+      if (has_ended && is_new && is_settled)
+        return write(*last_frame_, buffers);  // the end came right after it
       if (!taken.ok()) return taken.status();
-      if (*taken) continue;
+      if (*taken) {
+        is_new = true;
+        continue;
+      }
       if (is_settled) return write(*last_frame_, buffers);
     }
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());

@@ -188,6 +188,7 @@ void Ledger::session_lost() {
 }
 
 void Ledger::drop_unaccepted() {
+  newest_dropped_ = newest();
   restore_.reset();
   unkept_ = {};
   in_flight_.clear();

@@ -78,7 +78,10 @@ class Ledger {
   /// not kept are sent again; those that the server has change nothing.
   void reopened(std::uint64_t epoch, std::uint64_t seq);
   /// The epoch of a session that was just created, joined or taken over.
-  void begin_epoch(std::uint64_t epoch) { epoch_ = epoch; }
+  void begin_epoch(std::uint64_t epoch) {
+    epoch_ = epoch;
+    newest_dropped_ = 0;
+  }
 
   /// The connection is lost: updates in flight wait again. Updates are idempotent, so sending one twice does no harm.
   void connection_lost();
@@ -95,6 +98,9 @@ class Ledger {
 
   /// The newest update that was not refused; 0 if there is none.
   std::uint64_t newest() const;
+  /// What newest() was before the last drop_unaccepted() of this epoch; 0 if there was none. Results of earlier updates answer
+  /// none that was dropped.
+  std::uint64_t newest_dropped() const { return newest_dropped_; }
 
  private:
   void merge_accepted(NumberedUpdate update, bool is_kept);
@@ -103,6 +109,7 @@ class Ledger {
   const Order order_;
   std::uint64_t next_seq_ = 1;
   std::uint64_t epoch_ = 0;
+  std::uint64_t newest_dropped_ = 0;
   NumberedUpdate accepted_;  // if begins_bare_, handles only as Handle, never as Motion or Removal
   NumberedUpdate unkept_;    // accepted since the server last kept an update; changes as they were sent
   std::optional<NumberedUpdate> restore_;  // what the server may have lost, with what it has accepted since

@@ -67,7 +67,7 @@ absl::StatusOr<Frame> Link::next_frame(Clock::time_point deadline) {
 }
 
 /// Another thread may take the result meanwhile; this call returns it as well. If the last frame is the result only because
-/// a newer update has been refused meanwhile, the refusal is returned first; so is the end of the session, which drops updates.
+/// a newer update has been refused meanwhile, the refusal is returned first.
 absl::StatusOr<Frame> Link::settle(Clock::time_point deadline) {
   for (;;) {
     const std::uint64_t takes = box_.takes();
@@ -75,17 +75,14 @@ absl::StatusOr<Frame> Link::settle(Clock::time_point deadline) {
     if (!taken.ok()) return taken.status();
     std::optional<Frame> last = box_.last_final();
     const bool is_settled = last && is_result(*last);
-    if (is_settled && !box_.has_problem()) {
-      const absl::Status end = box_.end();
-      return end.ok() ? absl::StatusOr<Frame>(*std::move(last)) : end;
-    }
+    if (is_settled && !box_.has_problem()) return *std::move(last);
     if (!box_.wait(deadline, takes)) return no_frame();
   }
 }
 
 bool Link::is_result(const Frame& frame) const {
   const std::scoped_lock lock(mutex_);
-  return frame.is_final && frame.input_seq >= ledger_.newest();
+  return frame.is_final && frame.input_seq >= std::max(ledger_.newest(), ledger_.newest_dropped());
 }
 
 absl::Status Link::no_frame() const {

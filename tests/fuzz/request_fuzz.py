@@ -264,7 +264,7 @@ def fuzz_once(world, options):
         end += time.monotonic() - judging
 
     with concurrent.futures.ThreadPoolExecutor(AT_ONCE) as pool:
-        while time.monotonic() < end and (not options.cases or number < options.cases) and found < options.most:
+        while time.monotonic() < end and (not options.cases or number < options.cases) and found < options.most and once < MOST_ONCE:
             numbers = range(number, number + BATCH)
             cases = [request_cases.make(options.seed, one) for one in numbers]
             world.look()

@@ -9,12 +9,18 @@ namespace {
 
 class SettleTest : public LinkTest {
  protected:
-  /// On a stream whose update 1 is answered with a final frame, which is taken.
-  std::shared_ptr<Stream> settled_stream() {
+  /// A stream whose update 1 is answered, and has no frame yet.
+  std::shared_ptr<Stream> answered_stream() {
     open();
     const auto stream = opened_stream();
     EXPECT_EQ(link_->update(adding("base")).value(), 1u);
     answer(*stream, 1);
+    return stream;
+  }
+
+  /// The same with a final frame, which is taken.
+  std::shared_ptr<Stream> settled_stream() {
+    const auto stream = answered_stream();
     stream->say(frame(1, 1));
     EXPECT_TRUE(next_frame().ok());
     return stream;
@@ -29,6 +35,15 @@ class SettleTest : public LinkTest {
   static void answer(Stream& stream, std::uint64_t input_seq) {
     hear_update(stream);
     stream.say(result(input_seq));
+  }
+
+  /// Ends the session, and waits until the client knows.
+  void replace_writer(Stream& stream) {
+    stream.say(go_away(v1::GO_AWAY_REASON_WRITER_REPLACED));
+    stream.end(absl::OkStatus());
+    const auto end = FrameBox::Clock::now() + kPatience;
+    while (link_->ended().ok() && FrameBox::Clock::now() < end) std::this_thread::yield();
+    EXPECT_FALSE(link_->ended().ok());
   }
 
   absl::StatusOr<Frame> settle_now() { return link_->settle(FrameBox::Clock::now()); }
@@ -62,6 +77,23 @@ TEST_F(SettleTest, ReturnsTheResultBeforeAnUpdateThatWasRefusedOnceThatIsSaid) {
   stream->say(refusal(2));
   EXPECT_EQ(fault_of(settle().status()).reason, "HANDLE_VERTEX_OUT_OF_RANGE");
   EXPECT_EQ(settle_now().value().frame_seq, 1u);
+}
+
+TEST_F(SettleTest, ReturnsTheResultThoughTheSessionHasEndedRightAfterIt) {
+  const auto stream = answered_stream();
+  stream->say(frame(1, 1));
+  replace_writer(*stream);
+  EXPECT_EQ(settle().value().frame_seq, 1u);
+  EXPECT_EQ(fault_of(next_frame().status()).reason, "WRITER_REPLACED");
+}
+
+TEST_F(SettleTest, SaysWhyTheSessionHasEndedWhereThatDroppedANewerUpdate) {
+  const auto stream = answered_stream();
+  stream->say(frame(1, 1));
+  EXPECT_EQ(link_->update(adding("tip")).value(), 2u);
+  hear_update(*stream);
+  replace_writer(*stream);
+  EXPECT_EQ(fault_of(settle().status()).reason, "WRITER_REPLACED");
 }
 
 TEST_F(SettleTest, GivesTheResultToEveryThreadThatWaitsForIt) {

@@ -63,7 +63,7 @@ class HandOverCallsTest : public RestartTest {
   }
 
   /// Longer than usual, because a holder that is held up for two thirds of a lease may lose its sessions.
-  static constexpr std::chrono::milliseconds kLease{2400}, kPatience{4000};
+  static constexpr std::chrono::milliseconds kLease{3900}, kPatience{6500};
   const TriangleMesh mesh_ = bar_mesh();
   RedisServer redis_{folder_};
   std::unique_ptr<Server> other_server_;

@@ -73,19 +73,19 @@ TEST(Scheduler, WhoeverUsedLessTimeGoesFirst) {
   is_busy.get_future().wait();
   scheduler.wake(std::make_shared<Job>(false, [&] {
     spin(std::chrono::milliseconds(5));
-    return ++large < 10000 && small < 2000;
+    return ++large < 50000 && small < 10000;
   }));
   scheduler.wake(std::make_shared<Job>(false, [&] {
     spin(std::chrono::microseconds(50));
-    if (++small < 2000) return true;
+    if (++small < 10000) return true;
     done.set_value();
     return false;
   }));
   done.get_future().wait();
   release.count_down();
   // Equal shares of time mean a hundred small slices for each large one; with turns in order it would be one.
-  EXPECT_GE(small, 2000);
-  EXPECT_LT(large, 400);
+  EXPECT_GE(small, 10000);
+  EXPECT_LT(large, 2000);
 }
 
 /// A scheduler of two threads, one of which is busy, so that the other has to choose.

@@ -82,8 +82,8 @@ class FrameBox:
         with self._changed:
             self.raise_problem()
             taken, self._newest = self._newest, None
-            if taken is None:
-                self.raise_end()
+            if taken is None and self._end is not None:
+                raise again(self._end)
             if taken is not None:
                 self.last_final = taken.frame if taken.frame.is_final else None
                 self._count_take()
@@ -95,12 +95,6 @@ class FrameBox:
             if self._problems:
                 self._count_take()
                 raise again(self._problems.popleft())
-
-    def raise_end(self) -> None:
-        """Raises the reason if nothing more comes."""
-        with self._changed:
-            if self._end is not None:
-                raise again(self._end)
 
     def _count_take(self) -> None:
         self.takes += 1

@@ -80,17 +80,15 @@ class Following:
     def take_result(self) -> Frame | None:
         """The frame taken last, by any caller, if it is the finished result of the newest update.
 
-        Raises the refusal first if the last frame is the result only because a newer update has been refused meanwhile, and
-        the reason if it is the result only because the session has ended, which drops updates.
+        Raises the refusal first if the last frame is the result only because a newer update has been refused meanwhile.
         """
         self.take()
         last = self.box.last_final
         if last is None or not self.is_result(last):
             return None
         self.box.raise_problem()
-        self.box.raise_end()
         return last
 
     def is_result(self, frame: Frame) -> bool:
         with self.changed:
-            return frame.is_final and frame.input_seq >= self.ledger.newest
+            return frame.is_final and frame.input_seq >= max(self.ledger.newest, self.ledger.newest_dropped)

@@ -74,6 +74,7 @@ class Ledger:
         self._begins_bare = begins_bare
         self._next_seq = 1
         self._epoch = 0
+        self._newest_dropped = 0
         self._accepted = NumberedUpdate(0, Update())
         self._unkept = NumberedUpdate(0, Update())  # accepted since the server last stored something, as sent
         self._restore: NumberedUpdate | None = None
@@ -175,6 +176,7 @@ class Ledger:
     def begin_epoch(self, epoch: int) -> None:
         """The session was just created, joined or taken over."""
         self._epoch = epoch
+        self._newest_dropped = 0
 
     @property
     def accepted_settings(self) -> Settings:
@@ -211,6 +213,7 @@ class Ledger:
 
     def drop_unaccepted(self) -> None:
         """Another writer took over: drops everything that the server has not accepted, and everything that it may have lost."""
+        self._newest_dropped = self.newest
         self._restore = None
         self._unkept = NumberedUpdate(0, Update())
         self._in_flight = []
@@ -231,3 +234,9 @@ class Ledger:
         if self._waiting is not None:
             return self._waiting.seq
         return max([self._accepted.seq, *(one.seq for one in self._in_flight)])
+
+    @property
+    def newest_dropped(self) -> int:
+        """What `newest` was before the last drop_unaccepted() of this epoch; 0 if there was none. Results of earlier updates
+        answer none that was dropped."""
+        return self._newest_dropped

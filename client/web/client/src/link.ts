@@ -46,6 +46,8 @@ export class Link {
   #goAway: GoAway | undefined;
   /** Set while no stream is open: the server may continue from an older state. Updates wait until it says which. */
   #mayHaveGoneBack = false;
+  /** The newest update when the session ended, which dropped those without an answer. Results of earlier ones do not answer them. */
+  #newestDropped = 0;
   #connection: Connection = "idle";
   readonly #notices = new Notices();
   /** How many callers wait for frames even if the page is hidden. */
@@ -80,6 +82,7 @@ export class Link {
     this.ledger = new Ledger(copy?.isBare);
     this.ledger.countFrom(lease.inputSeq);
     this.ledger.beginEpoch(lease.epoch);
+    this.#newestDropped = 0;
     this.#rules = new RecoveryRules(copy !== undefined, rpc.reconnectForMs);
   }
 
@@ -141,7 +144,7 @@ export class Link {
   takeResult(): Frame | undefined {
     if (!this.take() && this.box.isClosed) return undefined;
     const last = this.box.lastFinal;
-    return last && last.inputSeq >= this.ledger.newest ? last : undefined;
+    return last && last.inputSeq >= Math.max(this.ledger.newest, this.#newestDropped) ? last : undefined;
   }
 
   /** Frames come even if the page is hidden, until the returned function is called. */
@@ -169,6 +172,7 @@ export class Link {
     this.#lease = lease;
     this.ledger.countFrom(lease.inputSeq);
     this.ledger.beginEpoch(lease.epoch);
+    this.#newestDropped = 0;
     this.box.beginEpoch(lease.epoch);
     this.#over = undefined;
     this.#downSince = undefined;
@@ -292,6 +296,7 @@ export class Link {
     this.#over = why;
     this.#pauses.end();
     this.#mayHaveGoneBack = false;
+    this.#newestDropped = this.ledger.newest;
     this.ledger.dropUnaccepted();
     this.#isStreaming = false;
     this.#lane?.close();
@@ -323,6 +328,7 @@ export class Link {
     this.isRecreated = this.copy!.isBare && this.ledger.hasRestore;
     this.ledger.countFrom(this.#lease.inputSeq);
     this.ledger.beginEpoch(this.#lease.epoch);
+    this.#newestDropped = 0;
     this.box.beginSession();
   }
 

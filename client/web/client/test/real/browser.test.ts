@@ -66,7 +66,7 @@ test.each([4, 5])(
 );
 
 test.each([1, 2])(
-  "a page of credit %i that is busy for five seconds then gets the newest frame",
+  "a page of credit %i that is busy for five seconds then gets a fresh frame",
   async (credit) => {
     const { mesh, handles } = grid(100);
     const session = await openSession(mesh, { url: service.url, settings: { p: 2 } });
