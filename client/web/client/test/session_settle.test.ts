@@ -1,5 +1,6 @@
 import { Code, ConnectError } from "@connectrpc/connect";
 import { expect, test } from "vitest";
+import { GoAwayReason } from "../src/gen/lpdeform/v1/service_pb.js";
 import { begin, next, refusal } from "./harness.js";
 
 const base = { base: { vertices: [0] } };
@@ -41,6 +42,23 @@ test("what was refused leaves the result before it", async () => {
   session.setHandles({ tip: { vertices: [9] } });
   await expect(session.settle()).rejects.toMatchObject({ reason: "HANDLE_VERTEX_OUT_OF_RANGE" });
   expect(await session.settle({ timeoutMs: 0 })).toBe(frame);
+});
+
+test.each([
+  ["gives its result though the session has ended since", false],
+  ["is told why the session has ended, and not the result of the update before", true],
+])("whoever waits for the newest update %s", async (_, isUnderWay) => {
+  const { server, session } = await begin();
+  session.setHandles(base);
+  await server.until(() => server.updates.length === 1);
+  server.stream.frame({ frameSeq: 1n, inputSeq: 1n, isFinal: true }, { x: 1 });
+  server.on.update = () => new Promise<never>(() => undefined); // without an answer
+  if (isUnderWay) session.setHandles({ tip: { vertices: [1] } });
+  server.stream.goAway(GoAwayReason.SESSION_DELETED);
+  const closed = new Promise<void>((resolve) => session.on("connection", (state) => state === "closed" && resolve()));
+  await closed;
+  if (isUnderWay) await expect(session.settle()).rejects.toMatchObject({ reason: "SESSION_DELETED" });
+  else expect((await session.settle()).inputSeq).toBe(1);
 });
 
 test("everybody who waits gets the result", async () => {
