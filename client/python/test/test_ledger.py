@@ -152,3 +152,15 @@ def test_what_was_not_kept_is_void_once_another_writer_took_over() -> None:
     ledger.drop_unaccepted()
     ledger.resumed_at(1)
     assert not ledger.has_waiting
+
+
+def test_an_update_that_is_dropped_is_answered_by_no_result_before_it_until_a_new_epoch() -> None:
+    ledger = Ledger()
+    ledger.add(Update({"tip": Handle([7])}))
+    ledger.send_next()
+    ledger.accept(1)
+    ledger.add(move(5))
+    ledger.drop_unaccepted()
+    assert (ledger.newest, ledger.newest_dropped) == (1, 2)
+    ledger.begin_epoch(2)
+    assert ledger.newest_dropped == 0
