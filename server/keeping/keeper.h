@@ -123,9 +123,9 @@ class Keeper : public std::enable_shared_from_this<Keeper> {
   };
 
   /// Waits, before the process ends, until everything is stored, and retries while the store fails, until
-  /// `end`. After `end` no change is begun to be written, and no store call is awaited; one that is under way may still succeed. Callers who wait for it, or come later,
-  /// are told STORE_FAILING, or that their update is not kept. Returns what is not stored. The log has a line
-  /// for each such session.
+  /// `end`. After `end` no change is begun to be written, and no store call is awaited; one that is under way
+  /// may still succeed. Callers who wait for it, or come later, are told STORE_FAILING, or that their update is
+  /// not kept. Returns what is not stored. The log has a line for each such session.
   std::vector<Unkept> flush(std::chrono::steady_clock::time_point end);
 
   /// A session counts as in use for this long after its last use, and as long as it has a stream, because the
