@@ -8,8 +8,8 @@ SERVER: lpdeform-server. Cases are sent in batches, several at a time; after eac
   spares the two callers only because their connections are others;
 - an end of the server or of Envoy.
 The batch is then sent again one by one, the case that does it made as small as it stays one, and printed; the seed makes it again.
-What happens once only is not counted: a machine that leaves the server without a core for a second cuts streams, too. A case does
-it twice, or its batch does it again; frames that come late do so in a second round as well.
+What happens once is not counted, because streams also end when the server gets no core for a second. A case counts if it does it
+twice, a batch if it does it again, and late frames if a second round has them.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ from request_victims import PATIENCE, Native, Page
 
 BATCH, AT_ONCE = 100, 8
 ANSWER_WITHIN = 0.5  # seconds that a case waits for an answer, which some never get
-# A stream also ends where the server gets no core for a second. So a batch counts if it breaks something again; so many that did it
-# once count as one.
+# A stream also ends if the server gets no core for a second. So a batch counts only if it breaks something again. This many batches
+# that did it once count as a fault.
 MOST_ONCE = 3
 ENDED_BY_SERVER = "cluster.lpdeform.upstream_cx_destroy_remote_with_active_rq"
 LEFT_OUT = "cluster.lpdeform.outlier_detection.ejections_enforced_total"

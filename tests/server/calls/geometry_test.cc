@@ -153,8 +153,8 @@ TEST_F(GeometryTest, OthersAreAnsweredWhileTheGeometryOfALargeMeshIsLookedAt) {
   const auto small = create(bar_mesh());
   std::uint64_t seq = 0;
   bool are_others_first = false;
-  for (int tries = 0; tries < 10 && !are_others_first;
-       ++tries) {  // they may be over before this thread gets a turn
+  // The updates may be over before this thread gets a turn.
+  for (int tries = 0; tries < 10 && !are_others_first; ++tries) {
     const auto large = create(necked_bar(60, 80, 20, 20));
     const UpdatesUnderWay updates(*stub_, large, 8);  // more than the pool has threads
     for (int k = 0; k < 20; ++k) ASSERT_TRUE(update(small, ends_message(bar_mesh().vertices, ++seq, 1)).ok());

@@ -184,8 +184,8 @@ TEST_F(CrowdedSolveTest, SaysThatItIsThereWhileItWaitsForAThreadAndIsSetUp) {
   });
   const TriangleMesh large = box_surface(40, 40, 160);  // set up in some 100 ms
   bool say_all = false;
-  for (int tries = 0; tries < 10 && !say_all;
-       ++tries) {  // the clock's thread may get no turn during the set-up
+  // The clock's thread may get no turn during the set-up.
+  for (int tries = 0; tries < 10 && !say_all; ++tries) {
     std::vector<v1::SolveRequest> requests;
     for (int k = 0; k < 3; ++k) {
       requests.push_back(solve_request(create(large)));

@@ -45,9 +45,9 @@ test("what was refused leaves the result before it", async () => {
 });
 
 test.each([
-  ["gives its result though the session has ended since", false],
-  ["is told why the session has ended, and not the result of the update before", true],
-])("whoever waits for the newest update %s", async (_, isUnderWay) => {
+  ["the newest result is returned, though the session has ended since", false],
+  ["the end of the session is reported if it dropped the newest update", true],
+])("%s", async (_, isUnderWay) => {
   const { server, session } = await begin();
   session.setHandles(base);
   await server.until(() => server.updates.length === 1);
