@@ -36,8 +36,6 @@ const isTelephone = (width: number, height: number) => (width <= 720 && width <=
 const isLittle = (width: number, height: number) =>
   isTelephone(width, height) || (width <= 900 && height <= 900) || (width <= 1150 && height <= 600);
 const little = sizes.filter(([width, height]) => isTelephone(width, height));
-const drawn = ({ page }: User) =>
-  page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 
 /** What stands over the pictures or beside them, and must not meet. */
 const parts = [
@@ -193,7 +191,7 @@ it.each(sizes)(
       for (const isSplit of shape === "creature" ? [false, true] : [false]) {
         await user.ask(`app.view.set({ isSplit: ${isSplit} })`);
         await user.until("window.__lpdeform.app.panes.every(({ stage }) => stage.surface)");
-        await drawn(user);
+        await user.drawn();
         const all = await user.page.evaluate(covering);
         if (all.length > 0) found[`${shape}, ${isSplit ? "two pictures" : "one"}`] = all;
       }
@@ -207,7 +205,7 @@ async function showCreature(isSplit: boolean, isPanelOpen: boolean): Promise<voi
   await user.ask(`app.view.set({ isSplit: ${isSplit}, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
   await user.ask(`app.startOver("creature", "coarse")`);
   await user.until("window.__lpdeform.app.panes.every(({ stage }) => stage.surface)");
-  await drawn(user);
+  await user.drawn();
 }
 
 it.each(sizes)(
@@ -219,7 +217,7 @@ it.each(sizes)(
       for (const isSplit of [false, true]) {
         await showCreature(isSplit, isPanelOpen);
         await user.ask(`app.view.set({ tool: "paint" })`);
-        await drawn(user);
+        await user.drawn();
         const all = (await user.page.evaluate(covering)).filter((fault) => !fault.includes("is small"));
         if (all.length > 0) found[`${isSplit ? "two pictures" : "one"}, panel ${isPanelOpen ? "open" : "closed"}`] = all;
       }
@@ -238,7 +236,7 @@ it.each(sizes)(
         await showCreature(isSplit, isPanelOpen);
         const { notice } = messages;
         await user.page.evaluate(([notice]) => (window as any).__lpdeform.app.facts.set({ notice }), [notice]);
-        await drawn(user);
+        await user.drawn();
         const all = [
           ...(await user.page.evaluate(covering)),
           ...(await user.page.evaluate(faults, [parts, isLittle(width, height) ? beside : []])),
@@ -258,11 +256,11 @@ it.each(sizes)(
     const found: Record<string, string[]> = {};
     for (const isPanelOpen of [false, true]) {
       await user.ask(`app.view.set({ isSplit: false, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
-      await drawn(user);
+      await user.drawn();
       const room = async () => (await user.page.locator("canvas.stage").boundingBox())!.height;
       const before = await room();
       await user.page.evaluate(([notice]) => (window as any).__lpdeform.app.facts.set({ notice }), [longNotice]);
-      await drawn(user);
+      await user.drawn();
       const all = await user.page.evaluate(faults, [parts, isLittle(width, height) ? beside : []]);
       if ((await room()) < 0.55 * before) all.push(`the picture is ${await room()} px high, without a notice ${before}`);
       if (all.length > 0) found[`panel ${isPanelOpen ? "open" : "closed"}`] = all;
@@ -291,7 +289,7 @@ it.each(sizes)("every option of every tool, the menu and the panel are reached a
   await one.page.setViewportSize({ width, height });
   for (const tool of tools) {
     await one.ask(`app.view.set({ isSplit: false, isPanelOpen: false, tool: "${tool}" })`);
-    await drawn(one);
+    await one.drawn();
     expect(await one.page.evaluate(outOfReach, ".options")).toEqual([]);
   }
   await one.page.getByRole("button", { name: "Save" }).click();
@@ -310,7 +308,7 @@ it.each(cases)("what the dock has is pressed where it is seen at %d x %d under %
   for (const isSplit of [false, true]) {
     for (const isPanelOpen of [false, true]) {
       await one.ask(`app.view.set({ isSplit: ${isSplit}, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
-      await drawn(one);
+      await one.drawn();
       expect(await one.page.evaluate(outOfReach, ".dock")).toEqual([]);
     }
   }
@@ -321,7 +319,7 @@ it.each(little)("the picture has more than half of a telephone of %d x %d, with 
     await one.page.setViewportSize({ width, height });
     for (const tool of tools) {
       await one.ask(`app.view.set({ isSplit: false, isPanelOpen: false, tool: "${tool}" })`);
-      await drawn(one);
+      await one.drawn();
       const box = (await one.page.locator("canvas.stage").first().boundingBox())!;
       expect((box.width * box.height) / (width * height)).toBeGreaterThan(0.5);
     }
@@ -335,7 +333,7 @@ it.each(cases)("nothing covers anything at %d x %d under %s", async (width, heig
   const found: Record<string, string[]> = {};
   for (const state of pointer === "fingers" ? states.filter(({ tool }) => tool === "paint") : states) {
     await one.ask(`app.view.set(${JSON.stringify(state)})`);
-    await drawn(one);
+    await one.drawn();
     const all = await one.page.evaluate(faults, [parts, isLittle(width, height) ? beside : []]);
     if (all.length > 0) found[JSON.stringify(state)] = all;
   }
@@ -353,7 +351,7 @@ it.each(cases)("nothing covers anything at %d x %d under %s", async (width, heig
       [messages],
     );
     await one.page.locator(".banner").waitFor();
-    await drawn(one);
+    await one.drawn();
     const all = [
       ...(await one.page.evaluate(faults, [parts, isLittle(width, height) ? [".notice"] : []])),
       ...(await one.page.evaluate(cutShadows)),
@@ -382,7 +380,7 @@ it.each([
   await user.page.setViewportSize({ width, height });
   for (const isPanelOpen of [true, false, true]) {
     await user.ask(`app.view.set({ isSplit: true, isPanelOpen: ${isPanelOpen}, tool: "move" })`);
-    await drawn(user);
+    await user.drawn();
     const [first, second] = await Promise.all([0, 1].map((k) => user.page.locator(".pane").nth(k).boundingBox()));
     const wanted = first!.y === second!.y ? ["left", "right"] : ["upper", "lower"];
     expect(await user.page.locator(".p-name small").allTextContents()).toEqual(wanted);
@@ -392,7 +390,7 @@ it.each([
 it("a picture keeps its size while it is pressed, whatever is said meanwhile", async () => {
   await user.page.setViewportSize({ width: 390, height: 844 });
   await user.ask(`app.view.set({ isSplit: false, isPanelOpen: false, tool: "move" })`);
-  const height = async () => (await drawn(user), (await user.page.locator("canvas.stage").boundingBox())!.height);
+  const height = async () => (await user.drawn(), (await user.page.locator("canvas.stage").boundingBox())!.height);
   const say = (isBad: boolean) =>
     user.page.evaluate(([text, isBad]) => (window as any).__lpdeform.app.facts.set({ notice: { text, isBad } }), [
       messages.notice.text,
@@ -429,7 +427,7 @@ it("the shape is fitted again when the panel opens after the first drag", async 
   await fresh.drag(await fresh.vertexOnPage(vertex!), -90, -60);
   await fresh.settled();
   await fresh.page.getByRole("button", { name: "Side panel" }).click();
-  await drawn(fresh);
+  await fresh.drawn();
   expect(await fresh.page.evaluate(covering)).toEqual([]);
   await fresh.close();
 });

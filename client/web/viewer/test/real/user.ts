@@ -96,6 +96,17 @@ export class User {
     })()`);
   }
 
+  /** Until two more frames were drawn, so that what was done before is in the picture. */
+  drawn(): Promise<void> {
+    return this.page.evaluate(
+      () =>
+        new Promise<void>((done, failed) => {
+          requestAnimationFrame(() => requestAnimationFrame(() => done()));
+          setTimeout(() => failed(new Error("the page answers, but drew nothing for 60 s")), 60_000);
+        }),
+    );
+  }
+
   vertexOnPage(vertex: number, pane = 0): Promise<{ x: number; y: number }> {
     return this.ask(`vertexOnPage(${vertex}, ${pane})`);
   }
