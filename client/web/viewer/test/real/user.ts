@@ -96,7 +96,7 @@ export class User {
     })()`);
   }
 
-  /** Until two more frames were drawn, so that what was done before is in the picture. */
+  /** Until another frame was drawn, which shows what was done before. */
   drawn(): Promise<void> {
     return this.page.evaluate(
       () =>
