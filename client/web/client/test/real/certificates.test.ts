@@ -20,9 +20,12 @@ test("a result that stands comes again with its gap, each result with its own", 
     const input = session.setHandles(bent);
     const result = await session.settle({ timeoutMs: 20_000 });
     let certified: Frame = result;
-    for await (const frame of session) {
-      certified = frame;
-      if (frame.optimalityGap !== undefined) break;
+    // A slow reader may get the result only with its gap, and nothing comes after it.
+    if (result.optimalityGap === undefined) {
+      for await (const frame of session) {
+        certified = frame;
+        if (frame.optimalityGap !== undefined) break;
+      }
     }
     expect(certified).toMatchObject({ inputSeq: input, isFinal: true, energy: result.energy });
     expect([...certified.positions]).toEqual([...result.positions]);
