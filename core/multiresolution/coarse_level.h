@@ -38,6 +38,8 @@ class CoarseLevel {
  public:
   /// Vertices of the fine shape over those of its coarse level, below kLarge vertices and from there on.
   static constexpr std::int32_t kRatio = 6, kRatioOfLarge = 10, kLarge = 60000;
+  /// What a level holds of each fine vertex, beside the level's own shape and solver.
+  static constexpr std::size_t kBytesPerFineVertex = 36;
 
   /// The mesh of the coarse level of `fine`.
   static CoarseMesh coarsened(const RestShape& fine);
@@ -125,6 +127,7 @@ class CoarseLevel {
     std::array<std::int32_t, kGuides> vertex;  // coarse
     std::array<float, kGuides> weight;         // they add up to 1, to single precision
   };
+  static_assert(kBytesPerFineVertex == sizeof(std::int32_t) + sizeof(Guides));
   std::vector<std::int32_t> fine_vertex_, coarse_vertex_;  // see CoarseMesh
   std::vector<double> share_;                              // the number of fine vertices of each coarse one
   std::vector<Guides> guides_;                             // of each fine vertex

@@ -13,6 +13,7 @@ namespace {
 constexpr double kShare = 0.8;    // of the sum of E_i^q that the cells have which stay; q is the largest p_i,
 constexpr double kMostPower = 3;  // but at most this: at a large p other cells come to be the worst ones
 constexpr double kMostChosen = 0.2;  // of the fine vertices, before the ring around them is added
+constexpr std::int32_t kRatio = 20;  // of the others, to one that the level has
 
 /// The coarse vertices with the largest amounts for each fine vertex, until they have kShare of the sum, and the ring around them.
 /// `amount` and `share`, the number of fine vertices, are of each coarse vertex.
@@ -39,11 +40,11 @@ std::vector<char> largest(const RestShape& coarse, const std::vector<double>& am
   return result;
 }
 
-/// The vertices of a level that has those that stay, and a sixth of the others.
+/// The vertices of a level that has those that stay, and a twentieth of the others.
 std::int32_t size_with(const std::vector<char>& stays) {
   const auto all = static_cast<std::int32_t>(stays.size());
   const auto kept = static_cast<std::int32_t>(std::count(stays.begin(), stays.end(), 1));
-  return kept + (all - kept) / CoarseLevel::kRatio;
+  return kept + (all - kept) / kRatio;
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <stop_token>
 #include <vector>
@@ -8,13 +9,15 @@
 
 namespace lpdeform {
 
-/// A level between a coarse level and the fine one: all vertices of the fine mesh where the distortion is, and a sixth of them
+/// A level between a coarse level and the fine one: all vertices of the fine mesh where the distortion is, and a twentieth of them
 /// elsewhere. Most of what the fine level has left to do after a coarse level happens where the distortion is, which is a small part of
 /// the surface (tests/bench/tried.md). The rest has to move along, mostly rigidly. Each cell resists bending as the
 /// fine cells that it stands for (CellPass::set_bending). One caller at a time.
 class GradedLevel {
  public:
   static constexpr double kLargest = 0.45;  // the level's vertices, as a share of the fine ones
+  /// What it holds of each of its vertices, beside its shape and solver: the pose before, constraints and shares.
+  static constexpr std::size_t kBytesPerVertex = 140;
 
   /// Which fine vertices such a level has, for a state with the E_i^2 `squared_energies`. `largest_p` is the largest p_i. Empty if
   /// the distortion is spread so widely that the level would be too large, or if there is none.

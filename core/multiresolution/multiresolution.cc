@@ -22,12 +22,19 @@ constexpr double kLowestTolerance = 1e-4;       // on the lowest level of those,
 /// in worse minima when all levels bend like the finest.
 constexpr double kGentleStrain = 0.02;
 
-/// Fine iterations before the graded level, if no p_i is above 2. They take the kinks of the prolongation away, and often they are all
-/// that is needed. At a larger p the graded level comes first.
+/// Fine iterations before an early graded level, if no p_i is above 2. They take the kinks of the prolongation away, and often they are
+/// all that is needed. At a larger p the graded level comes first.
 constexpr int kFirstFine = 10;
-constexpr double kGradedTolerance = 1e-3;  // relative, of E^(1/p) on the graded level
+/// Relative tolerances of E^(1/p) on the graded level.
+constexpr double kGradedTolerance = 1e-3;
 constexpr double kGradedToleranceAtLargeP =
     3e-3;  // if some p_i > 2: iterations are dear, because it is larger
+constexpr double kLateTolerance = 1e-4;
+/// Every kReckon fine iterations, k since another level ended, what is left to do is reckoned: k times the mean relative fall of E^(1/p)
+/// in one of the last kReckon iterations. If E^(1/p) falls towards its limit as 1 / k, this is about what is left. From kFirstOfLate
+/// iterations on, a late graded level begins if it is over kMostLeft.
+constexpr int kReckon = 20, kFirstOfLate = 40;
+constexpr double kMostLeft = 0.03;
 /// E^(1/p) with which the fine level goes on from the graded one, over that before: the first iterations take kinks away.
 constexpr double kMostAfterGraded = 1.1;
 
@@ -139,39 +146,66 @@ bool Multiresolution::begin_to_ease() {
   return level_.solver().start(settings, problem_.stop).ok();
 }
 
-/// The vertices of the graded level, if there is to be one at the last evaluation's state. Otherwise empty, then and later.
+/// The vertices of the graded level, if there is to be one at the last evaluation's state. Otherwise empty, and there is no early one
+/// later, or none at all.
 std::vector<char> Multiresolution::chosen_for_graded() {
   std::vector<char> stays;
   if (!grading_) return stays;
   stays =
       GradedLevel::chosen(level_, problem_.objective.cells().squared_energies(), problem_.norm.highest_p());
-  if (stays.empty()) grading_.reset();
+  if (stays.empty()) end_grading();
   return stays;
+}
+
+/// No early graded level is to come any more, or none at all.
+void Multiresolution::end_grading() {
+  const bool may_come_late = grading_->is_early && grading_->may_come_late;
+  grading_->is_early = false;
+  if (!may_come_late) grading_.reset();
+}
+
+/// With what the fine level goes on from where it was. After the first iterations its smoothing does not begin again.
+Warmth Multiresolution::warmth_of_fine() const {
+  return fine_iterations_ > kFirstFine ? Warmth::kWarm : Warmth::kPrepared;
 }
 
 /// Begins a graded level from x, the last evaluation's state. False if there is to be none.
 bool Multiresolution::begin_graded(const std::vector<char>& stays) {
   if (stays.empty()) return false;
-  const Grading grading = *std::exchange(grading_, std::nullopt);
+  const Grading grading = *grading_;
+  end_grading();
   objective_ = problem_.objective.sum(problem_.norm);
   const FineInputs inputs{problem_.shape(), grading.handles, problem_.constraints, grading.material, 1};
   graded_ = GradedLevel::create(inputs, x_, stays, grading.make_solver, problem_.stop);
   looked_at_ = 0;
-  const double tolerance = problem_.norm.highest_p() > 2 ? kGradedToleranceAtLargeP : kGradedTolerance;
+  const double tolerance = !grading.is_early               ? kLateTolerance
+                           : problem_.norm.highest_p() > 2 ? kGradedToleranceAtLargeP
+                                                           : kGradedTolerance;
   if (graded_ && graded_->start(std::max(problem_.tolerance, tolerance), problem_.stop).ok()) return true;
   graded_.reset();
   return false;
 }
 
-/// Lets a graded level go on from the fine state, if there is to be one and it is time for it.
+/// Whether a graded level is to come now, an early or a late one. At p > 2, where the distortion is spread widely, there is no late one.
+/// To be called once before each fine iteration.
+bool Multiresolution::is_time_for_graded() {
+  if (!grading_) return false;
+  if (grading_->is_early) return fine_iterations_ == kFirstFine;
+  const double p = problem_.norm.highest_p();
+  if (p > 2 || since_level_ == 0 || since_level_ % kReckon != 0) return false;
+  const double before = std::exchange(reckoned_sum_, sum_);
+  const double fall = (1 - std::pow(sum_ / before, 1 / p)) / kReckon;
+  return since_level_ >= kFirstOfLate && since_level_ * fall > kMostLeft;
+}
+
+/// Lets a graded level go on from the fine state, if there is to be one.
 void Multiresolution::leave_fine() {
-  if (fine_iterations_ != kFirstFine) return;
   const std::vector<char> stays = chosen_for_graded();
   if (stays.empty()) return;
   x_ = fine_->x();
   fine_.reset();  // it would take memory beside the graded level
   stages_before_ = stage_ + 1;
-  if (!begin_graded(stays)) fine_ = std::make_unique<QuasiNewton>(problem_, std::move(x_), Warmth::kPrepared);
+  if (!begin_graded(stays)) fine_ = std::make_unique<QuasiNewton>(problem_, std::move(x_), warmth_of_fine());
 }
 
 /// x, moved along with the graded level, and evened out if that lowers its energy. Not always finite.
@@ -199,8 +233,9 @@ void Multiresolution::end_graded() {
   else
     problem_.objective.evaluate(x_, problem_.norm);
   found.resize(0, 3);
+  since_level_ = 0;
   stage_ = stages_before_++;  // the objective may be higher than while the level ran
-  fine_ = std::make_unique<QuasiNewton>(problem_, std::move(x_), is_good ? Warmth::kWarm : Warmth::kPrepared);
+  fine_ = std::make_unique<QuasiNewton>(problem_, std::move(x_), is_good ? Warmth::kWarm : warmth_of_fine());
 }
 
 /// Goes on from the better of the guess and the result of the coarse level: on the graded level, if that comes first, or on the fine one.
@@ -214,16 +249,18 @@ void Multiresolution::end_coarse() {
     problem_.objective.evaluate(x_, problem_.norm);
   }
   if (!is_better) grading_.reset();
-  if (problem_.norm.highest_p() > 2 && begin_graded(chosen_for_graded())) return;
+  const bool comes_first = grading_ && grading_->is_early && problem_.norm.highest_p() > 2;
+  if (comes_first && begin_graded(chosen_for_graded())) return;
   fine_ =
       std::make_unique<QuasiNewton>(problem_, std::move(x_), is_better ? Warmth::kPrepared : Warmth::kCold);
 }
 
 StepResult Multiresolution::step() {
-  if (fine_) leave_fine();
+  if (fine_ && is_time_for_graded()) leave_fine();
   if (fine_) {
     StepResult result = fine_->step();
-    ++fine_iterations_;
+    ++fine_iterations_, ++since_level_;
+    sum_ = *result.true_sum;
     stage_ = result.stage += stages_before_;
     return result;
   }

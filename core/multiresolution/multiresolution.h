@@ -17,6 +17,8 @@ struct Grading {
   const HandleSet& handles;
   Material material;  // as FineInputs::material
   MakeLevelSolver make_solver;
+  bool is_early = false;       // one is to come early, whatever is left to do
+  bool may_come_late = false;  // one may come later
 };
 
 /// Solves the coarse level first, by any method that suits it (which may include a level below it), then runs
@@ -27,7 +29,8 @@ struct Grading {
 /// of the level above it. The long way along a curved valley is travelled where an iteration costs least.
 ///
 /// On very large meshes a graded level (graded_level.h) follows after some fine iterations, or before them if some p_i > 2, unless the
-/// handles have moved little. The fine level goes on from its result.
+/// handles have moved little. The fine level goes on from its result. If no p_i is above 2, one may come late, also on smaller
+/// meshes: where the fine level still has a long way to go. On very large meshes it is the second.
 ///
 /// One iteration of the coarse or the graded level counts as one iteration here. Until the coarse level has ended, the state is the
 /// initial guess. While the graded level runs, it is the fine state before. If the prolonged result is not better than the initial
@@ -59,6 +62,9 @@ class Multiresolution : public Minimiser {
   bool begin_to_ease();
   bool begin_graded(const std::vector<char>& stays);
   std::vector<char> chosen_for_graded();
+  void end_grading();
+  Warmth warmth_of_fine() const;
+  bool is_time_for_graded();
   void leave_fine();
   Points moved_with_graded() const;
   void end_graded();
@@ -73,12 +79,15 @@ class Multiresolution : public Minimiser {
   bool goes_on_ = false;   // it was solved without them first
   int looked_at_ = 0;      // iterations of the coarse level at the last prolongation
   std::chrono::steady_clock::time_point next_look_;
-  std::optional<Grading> grading_;       // until there is a graded level, or none is to come
+  std::optional<Grading> grading_;       // as long as a graded level may come
   std::unique_ptr<GradedLevel> graded_;  // while it runs
   std::unique_ptr<QuasiNewton> fine_;    // null while another level runs
   int fine_iterations_ = 0;
-  int stage_ = 0;          // of the last step
-  int stages_before_ = 1;  // those before fine_; stage 0 is the coarse level
+  int since_level_ = 0;      // fine iterations since another level ended
+  double sum_ = 0;           // of problem_.norm, after the last of them
+  double reckoned_sum_ = 0;  // the same when it was last reckoned what is left
+  int stage_ = 0;            // of the last step
+  int stages_before_ = 1;    // those before fine_; stage 0 is the coarse level
 };
 
 }  // namespace lpdeform

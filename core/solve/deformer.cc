@@ -32,9 +32,11 @@ std::size_t bytes_beside_metric(const RestShape& shape) {
 
 /// What a graded level takes at most, beyond the workspace that the solver of the fine level does not have while it runs.
 std::size_t bytes_of_graded_level(const RestShape& shape, std::size_t own) {
-  const auto level = static_cast<std::size_t>(GradedLevel::kLargest * static_cast<double>(own));
-  const std::size_t unused =
-      (kWorkspace - kWorkspaceOfLevel) * static_cast<std::size_t>(shape.vertex_count());
+  const auto n = static_cast<std::size_t>(shape.vertex_count());
+  const std::size_t as_large = own + shape.memory_bytes() + GradedLevel::kBytesPerVertex * n;
+  const std::size_t level = static_cast<std::size_t>(GradedLevel::kLargest * static_cast<double>(as_large)) +
+                            CoarseLevel::kBytesPerFineVertex * n;
+  const std::size_t unused = (kWorkspace - kWorkspaceOfLevel) * n;
   return std::max(level, unused) - unused;
 }
 
@@ -61,7 +63,8 @@ absl::StatusOr<std::unique_ptr<Deformer>> Deformer::create(std::shared_ptr<const
     const bool has_coarse = shape->vertex_count() >= kCoarsenBeforehand;
     const bool is_large = shape->vertex_count() >= CoarseLevel::kLarge;
     std::size_t with_levels = has_coarse ? own + own / (is_large ? kCoarseShareOfLarge : kCoarseShare) : own;
-    if (shape->vertex_count() >= options.graded_from) with_levels += bytes_of_graded_level(*shape, own);
+    if (shape->vertex_count() >= std::min(options.graded_from, options.late_graded_from))
+      with_levels += bytes_of_graded_level(*shape, own);
     return options.admit(with_levels);
   };
   std::optional<absl::StatusOr<Metric>> metric;

@@ -30,6 +30,8 @@ struct DeformerOptions {
   double least_saving = 0;
   /// Cold solves of meshes of this size have a graded level between the coarse and the fine one (GradedLevel).
   std::int32_t graded_from = 200000;  // vertices
+  /// Cold solves of meshes of this size may have one later, where the fine level has a long way to go and no p_i is above 2.
+  std::int32_t late_graded_from = 60000;  // vertices
   /// Admission control: called once with the memory that a solve takes, before it is allocated. create() returns its
   /// error.
   std::function<absl::Status(std::size_t bytes)> admit = {};

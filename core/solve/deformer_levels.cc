@@ -19,6 +19,7 @@ constexpr std::int32_t kLargestSearchedLevel =
 // Minima of a coarse level that differ by less than this may be in another order on the fine level. It counts where the fine
 // level is too large to be searched itself.
 constexpr double kLeastSavingOfLevel = 0.02;
+constexpr std::int32_t kNever = std::numeric_limits<std::int32_t>::max();  // vertices
 constexpr double kWorthGoing = 32000;  // vertices; see is_guess_good_enough
 
 class DeformerOfLevel : public LevelSolver {
@@ -64,7 +65,8 @@ MakeLevelSolver Deformer::Impl::level_maker() const {
                                    .threads = workers().threads(),
                                    .search_up_to = kLargestSearchedLevel,
                                    .least_saving = is_large() ? kLeastSavingOfLevel : 0,
-                                   .graded_from = std::numeric_limits<std::int32_t>::max()};
+                                   .graded_from = kNever,
+                                   .late_graded_from = kNever};
     auto deformer = Deformer::create(std::move(level), of_level);
     return deformer.ok() ? std::make_unique<DeformerOfLevel>(*std::move(deformer)) : nullptr;
   };
@@ -72,9 +74,10 @@ MakeLevelSolver Deformer::Impl::level_maker() const {
 
 /// What a graded level takes, where a solve is to have one.
 std::optional<Grading> Deformer::Impl::grading() const {
-  if (shape->vertex_count() < options.graded_from || shape->weight_kind() == WeightKind::kUniform)
-    return std::nullopt;
-  return Grading{handles, effective_material(), level_maker()};
+  const bool is_early = shape->vertex_count() >= options.graded_from;
+  const bool may_come_late = shape->vertex_count() >= options.late_graded_from;
+  if (!(is_early || may_come_late) || shape->weight_kind() == WeightKind::kUniform) return std::nullopt;
+  return Grading{handles, effective_material(), level_maker(), is_early, may_come_late};
 }
 
 /// Makes the coarse level if there is none. False if the mesh cannot be coarsened, which is tried once.

@@ -334,11 +334,13 @@ TEST_P(DeformerOfSide, AsksForItsCoarseLevelsToo) {
   const TriangleMesh mesh = grid(side, side, 2);
   const auto shape = rest_shape(mesh);
   std::size_t asked = 0;
-  const DeformerOptions options{.admit = [&](std::size_t bytes) {
+  const auto admit = [&](std::size_t bytes) {
     asked = bytes;
     return absl::OkStatus();
-  }};
-  auto solver = Deformer::create(shape, options).value();
+  };
+  constexpr std::int32_t kNever =
+      std::numeric_limits<std::int32_t>::max();  // GradedLevelTest has these levels
+  auto solver = Deformer::create(shape, {.late_graded_from = kNever, .admit = admit}).value();
   const auto move_to = [&](double height) {
     HandleSet handles;
     (void)handles.set("left", {slice(mesh, 0, 0, 0), Fixed{}});
