@@ -164,7 +164,7 @@ void Multiresolution::end_grading() {
   if (!may_come_late) grading_.reset();
 }
 
-/// With what the fine level goes on from where it was. After the first iterations its smoothing does not begin again.
+/// With what the fine level goes on from where it was. After the first iterations its smoothing begins with the small eps of a warm start.
 Warmth Multiresolution::warmth_of_fine() const {
   return fine_iterations_ > kFirstFine ? Warmth::kWarm : Warmth::kPrepared;
 }

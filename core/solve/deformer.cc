@@ -30,7 +30,7 @@ std::size_t bytes_beside_metric(const RestShape& shape) {
   return n * (kWorkspace + kStates + kCellBytes) + kEdgeBytes * shape.neighbours().size();
 }
 
-/// What a graded level takes at most, beyond the workspace that the solver of the fine level does not have while it runs.
+/// What a graded level takes at most, with a metric in single precision, beyond the workspace that the solver of the fine level does not have while it runs.
 std::size_t bytes_of_graded_level(const RestShape& shape, std::size_t own) {
   const auto n = static_cast<std::size_t>(shape.vertex_count());
   const std::size_t as_large = own + shape.memory_bytes() + GradedLevel::kBytesPerVertex * n;

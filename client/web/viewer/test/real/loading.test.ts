@@ -18,20 +18,17 @@ it("the first picture needs none of three.js's tools for editing and exporting; 
 
   const service = await Service.start({ files: dist });
   const user = await User.open(`${service.url}/?shape=bar&detail=coarse`);
-  const loaded: string[] = [];
-  user.page.on(
-    "response",
-    (response) =>
-      void response.text().then(
-        (text) => loaded.push(text),
-        () => undefined,
-      ),
-  );
   await user.settled();
   await user.ask(`app.facts.set({ pointedOut: { vertices: [], edges: [0, 1], faces: [2] } })`);
   await user.save("Mesh as STL");
-  const have = (name: string) => loaded.some((text) => text.includes(name));
-  await expect.poll(() => tools.filter((name) => !have(name)), { timeout: 30_000 }).toEqual([]);
+  const missing = async () => {
+    const loaded = (await user.page.evaluate(() =>
+      performance.getEntriesByType("resource").map((entry) => new URL(entry.name).pathname),
+    )) as string[];
+    const code = loaded.filter((path) => path.endsWith(".js")).map((path) => readFileSync(join(dist, path), "utf8"));
+    return tools.filter((name) => !code.some((text) => text.includes(name)));
+  };
+  await expect.poll(missing, { timeout: 30_000 }).toEqual([]);
   await user.until("window.__lpdeform.app.panes[0].stage.highlight.object.children.length === 2");
   expect(user.errors).toEqual([]);
   await user.close();
