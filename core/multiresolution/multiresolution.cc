@@ -172,13 +172,13 @@ Warmth Multiresolution::warmth_of_fine() const {
 /// Begins a graded level from x, the last evaluation's state. False if there is to be none.
 bool Multiresolution::begin_graded(const std::vector<char>& stays) {
   if (stays.empty()) return false;
-  const Grading grading = *grading_;
-  end_grading();
+  const bool is_early = grading_->is_early;
   objective_ = problem_.objective.sum(problem_.norm);
-  const FineInputs inputs{problem_.shape(), grading.handles, problem_.constraints, grading.material, 1};
-  graded_ = GradedLevel::create(inputs, x_, stays, grading.make_solver, problem_.stop);
+  const FineInputs inputs{problem_.shape(), grading_->handles, problem_.constraints, grading_->material, 1};
+  graded_ = GradedLevel::create(inputs, x_, stays, grading_->make_solver, problem_.stop);
+  end_grading();
   looked_at_ = 0;
-  const double tolerance = !grading.is_early               ? kLateTolerance
+  const double tolerance = !is_early                       ? kLateTolerance
                            : problem_.norm.highest_p() > 2 ? kGradedToleranceAtLargeP
                                                            : kGradedTolerance;
   if (graded_ && graded_->start(std::max(problem_.tolerance, tolerance), problem_.stop).ok()) return true;

@@ -68,8 +68,10 @@ class Program:
         factor = self.matrix(self.squares, (len(constants), self.size))
         settings = clarabel.DefaultSettings()
         settings.verbose = False
-        settings.tol_gap_rel = settings.tol_gap_abs = 1e-10
-        settings.tol_feas = EXACT / 10  # by rounding some machines come to 2e-9 and no nearer
+        settings.tol_gap_rel = settings.tol_gap_abs = settings.tol_feas = 1e-10
+        # Without more refinement, rounding keeps some processors from this feasibility.
+        settings.iterative_refinement_reltol = settings.iterative_refinement_abstol = 1e-16
+        settings.iterative_refinement_max_iter = 50
         solution = clarabel.DefaultSolver(sparse.triu(2 * factor.T @ factor).tocsc(), linear + 2 * factor.T @ constants,
                                           self.matrix(self.entries, (len(self.bounds), self.size)), np.array(self.bounds),
                                           self.cones, settings).solve()

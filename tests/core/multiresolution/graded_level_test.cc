@@ -361,14 +361,15 @@ TEST_F(GradedLevelTest, HasTheVerticesWhereTheDistortionIs) {
   EXPECT_GE(graded->vertex_count(), distorted);
   const auto kept_whole = std::count(stays.begin(), stays.end(), 1);
   EXPECT_LT(graded->vertex_count(), kept_whole + 0.06 * static_cast<double>(squared.size()));
-  std::int32_t kept = 0;
+  std::int32_t kept = 0, coarse_there = 0;
   double stands_for = 0;  // a cell that stands for m fine cells keeps 1 / m of its resistance to bending
   ASSERT_EQ(bending.size(), graded->vertex_count());
   for (std::int32_t c = 0; c < graded->vertex_count(); ++c) {
     stands_for += 1 / bending[c];
-    if (std::abs(graded->positions()(c, 2) - 72) < 6 && bending[c] == 1) ++kept;
+    if (std::abs(graded->positions()(c, 2) - 72) < 6) ++(bending[c] >= 0.5 ? kept : coarse_there);
   }
   EXPECT_GE(kept, 0.8 * distorted);
+  EXPECT_LE(coarse_there, 0.01 * distorted);  // those beyond 80 % of the distortion, a twentieth of them
   EXPECT_NEAR(stands_for, shape->vertex_count(), 1e-6 * stands_for);
   EXPECT_EQ(level->moved(*shape, x, Workers(1)).rows(), x.rows());
 
