@@ -15,7 +15,7 @@ let user: User;
 withUser("/?shape=bar&detail=coarse&encoding=float32", (one) => (user = one));
 
 beforeAll(async () => {
-  await user.openFiles({ name: "tube.off", content: writeOff(tube) });
+  await user.openInstead({ name: "tube.off", content: writeOff(tube) });
 });
 
 /** The largest distance of vertices that were in one place. */

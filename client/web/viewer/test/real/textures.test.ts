@@ -34,8 +34,7 @@ it("clay is lit as seen by the viewer, and a mesh without materials has no textu
 
 it("the texture of a GLB is shown where the file has it, and bends with the surface", async () => {
   const picture = pngOf(2, 1, [255, 0, 0, 0, 255, 0]);
-  await user.openFiles({ name: "tube.glb", content: Buffer.from(makeGlb(false, picture)) });
-  await user.until(`window.__lpdeform.app.mesh.name === "tube.glb"`);
+  await user.openInstead({ name: "tube.glb", content: Buffer.from(makeGlb(false, picture)) });
   await user.ask("app.view.set({ isYUp: true })");
   await button("Texture").click();
   const at = async (column: number) => user.vertexOnPage(8 * (columns + 1) + column);
@@ -89,14 +88,13 @@ it("the images of an OBJ are shown if they are opened with it and its MTL, also 
   }
   const sheet = { name: "sheet.obj", content: `${lines.join("\n")}\n` };
   const mtl = { name: "sheet.mtl", content: "newmtl picture\nKd 1 1 1\nmap_Kd -clamp on maps/picture.png\n" };
-  await user.openFiles(sheet, mtl);
-  await user.until(`window.__lpdeform.app.mesh.name === "sheet.obj"`);
+  await user.openInstead(sheet, mtl);
   await button("Texture").click();
   await user.page
     .locator(".notice", { hasText: "Open these images together with sheet.obj to see them: maps/picture.png" })
     .waitFor();
   await button("Distortion").click();
-  await user.openFiles(sheet, mtl, { name: "picture.png", content: Buffer.from(pngOf(2, 1, [255, 0, 0, 0, 255, 0])) });
+  await user.openInstead(sheet, mtl, { name: "picture.png", content: Buffer.from(pngOf(2, 1, [255, 0, 0, 0, 255, 0])) });
   await user.until(`Object.keys(window.__lpdeform.app.mesh.materials ?? {}).length === 2`);
   await user.ask("app.view.set({ isYUp: false })");
   await button("Texture").click();
@@ -110,7 +108,7 @@ it("the images of an OBJ are shown if they are opened with it and its MTL, also 
   await shown();
   const project = { name: "sheet.lpdeform", content: await user.save("Project, to go on with (Ctrl+S)") };
   await user.ask(`app.openShape("sheet", "coarse")`);
-  await user.openFiles(project);
+  await user.openInstead(project);
   await user.until(`Object.keys(window.__lpdeform.app.mesh.materials ?? {}).length === 2`);
   await shown();
   const { x, y } = await at(4);

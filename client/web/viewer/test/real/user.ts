@@ -157,6 +157,18 @@ export class User {
     await (await chooser).setFiles(payload);
   }
 
+  /**
+   * Opens a mesh or a project and waits until it is there. What is open before may have the same name and the same handles,
+   * so that these do not say when.
+   */
+  async openInstead(...files: { name: string; content: string | Buffer }[]): Promise<void> {
+    const before = await this.page.evaluateHandle("window.__lpdeform.app.mesh");
+    await this.openFiles(...files);
+    const isOther = (mesh: unknown) => (window as any).__lpdeform.app.mesh !== mesh;
+    await this.page.waitForFunction(isOther, before, { timeout: 60_000, polling: 50 });
+    await before.dispose();
+  }
+
   /** Waits until the handles of an opened file are there, whose last has this name, and the page shows their result. */
   async handlesCame(last: string): Promise<void> {
     await this.until(`window.__lpdeform.document().handles.at(-1)?.name === ${JSON.stringify(last)}`);

@@ -186,7 +186,7 @@ describe("somebody with a mesh of their own", () => {
     const named = () => user.ask<object>("document().handles.map(({ name, vertices }) => ({ name, vertices }))");
     const before = await named();
 
-    await user.openFiles(towerFile, { name: "tower-handles.json", content: handles });
+    await user.openInstead(towerFile, { name: "tower-handles.json", content: handles });
     await expect.poll(named, { timeout: 10_000 }).toEqual(before);
     await user.settled();
     await user.until("window.__lpdeform.app.red > 0");
@@ -198,8 +198,8 @@ describe("somebody with a mesh of their own", () => {
     const upload = user.page.waitForRequest(
       (request) => request.url().endsWith("/CreateSession") && request.postDataBuffer()!.includes(bytes),
     );
-    await user.openFiles({ name: "bent.ply", content: exported });
-    await user.until("window.__lpdeform.app.mesh.name === 'bent.ply'");
+    await user.openInstead({ name: "bent.ply", content: exported });
+    expect(await user.ask("app.mesh.name")).toBe("bent.ply");
     await upload;
     await user.settled();
     expect(largestDifference(await user.positions(), numbers)).toBeLessThan(1e-3);
@@ -207,8 +207,8 @@ describe("somebody with a mesh of their own", () => {
   });
 
   it("exports what is shown, and says so, where the server is away", async () => {
-    await user.openFiles(towerFile, { name: "tower-handles.json", content: handles });
-    await user.until("window.__lpdeform.app.mesh.name === 'tower.off' && window.__lpdeform.document().handles.length === 2");
+    await user.openInstead(towerFile, { name: "tower-handles.json", content: handles });
+    await user.until("window.__lpdeform.document().handles.length === 2");
     await user.settled();
     await up.killServer();
     await user.until('window.__lpdeform.status() === "away"');
