@@ -11,6 +11,7 @@ namespace {
 constexpr int kPasses = 12;
 constexpr double kRefined = 1e-12;  // refinement ends when the correction's share of the result is <= this
 constexpr std::size_t kBytesPerEntry = 20;  // per matrix entry: what the factor has besides its values
+constexpr int kMostRaised = 10;             // pivots, with Precision::kRough
 constexpr double kSlowest = 0.3;            // the largest ratio of a correction to the previous one
 
 LowerMatrix lower_pattern(const RestShape& shape) {
@@ -69,7 +70,8 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
   precision_ = precision;
   is_single_current_ = is_double_current_ = false;
   ++version_;
-  if (precision == Precision::kSingle && single_.factor(Rows(*this), workers)) {
+  const int most_raised = precision == Precision::kRough ? kMostRaised : 0;
+  if (precision != Precision::kDouble && single_.factor(Rows(*this), workers, most_raised)) {
     double_.reset();  // takes several times the memory
     copy_ = {};
     matrix_ = {};

@@ -38,6 +38,7 @@ class Metric {
 
   /// What a factorisation is for.
   enum class Precision {
+    kRough,  // only for precondition(): as kSingle, but with a few pivots raised where its digits do not suffice
     kSingle,  // mainly for precondition(): several times as fast, half the memory
     kDouble,  // mainly for solve()
   };
@@ -54,7 +55,8 @@ class Metric {
   /// factorisation stays well conditioned if some cells have no weight. False if the factorisation fails. The present
   /// factor is kept if held vertices, precision and, up to a common factor, cell weights and entries are the same.
   /// `entries` form a positive semidefinite matrix; entries of vertex pairs without an edge go to the diagonal. If the
-  /// matrix cannot be factored in single precision, double is used. The same bits on any number of threads.
+  /// matrix cannot be factored in single precision, double is used, which takes three to four times the memory. The same
+  /// bits on any number of threads.
   [[nodiscard]] bool factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held,
                             const std::vector<MatrixEntry>& entries, const Workers& workers,
                             Precision precision = Precision::kSingle);

@@ -142,7 +142,7 @@ void SingleCholesky::update_rows(std::size_t node, std::size_t begin, std::size_
 }
 
 bool SingleCholesky::eliminate(std::size_t node, const SymmetricRows& matrix, const Workers& workers,
-                               Scratch& own) {
+                               std::atomic<int>& raisable, Scratch& own) {
   const Supernode& at = factor_.supernodes_[node];
   const auto columns = static_cast<std::size_t>(at.columns);
   load(node, matrix, own);
@@ -158,7 +158,9 @@ bool SingleCholesky::eliminate(std::size_t node, const SymmetricRows& matrix, co
     update_rows(node, begin, end, own.place);
   });
   float* const block = factor_.values_.data() + at.first_value;
-  if (!own.triangle.factor(block, columns, own.lowest.data())) return false;
+  int raised = 0;
+  if (!own.triangle.factor(block, columns, own.lowest.data(), raisable > 0 ? &raised : nullptr)) return false;
+  if (raised > 0 && (raisable -= raised) < 0) return false;
   if (at.row_count == 0) return true;
   for_rows(at.row_count, [&](std::size_t, std::size_t begin, std::size_t end) {
     own.triangle.solve_rows(block + (columns + begin) * columns, end - begin, scratch_of_thread().packed);
@@ -166,22 +168,24 @@ bool SingleCholesky::eliminate(std::size_t node, const SymmetricRows& matrix, co
   return true;
 }
 
-bool SingleCholesky::factor(const SymmetricRows& matrix, const Workers& workers) {
+bool SingleCholesky::factor(const SymmetricRows& matrix, const Workers& workers, int most_raised) {
   std::atomic<bool> is_good = true;
+  std::atomic<int> raisable = most_raised;
   const Workers alone(1);
   if (!factor_.stages_.empty()) {
     const SingleFactor::Stage& branches = factor_.stages_.front();
     workers.for_chunks(branches.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {
       for (const auto& [first, last] : branches[k].nodes) {
         for (std::int32_t node = first; node <= last && is_good; ++node) {
-          if (!eliminate(static_cast<std::size_t>(node), matrix, alone, scratch_of_thread())) is_good = false;
+          if (!eliminate(static_cast<std::size_t>(node), matrix, alone, raisable, scratch_of_thread()))
+            is_good = false;
         }
       }
     });
   }
   for (const auto& [first, last] : factor_.trunk_) {
     for (std::int32_t node = first; node <= last && is_good; ++node)
-      is_good = eliminate(static_cast<std::size_t>(node), matrix, workers, trunk_);
+      is_good = eliminate(static_cast<std::size_t>(node), matrix, workers, raisable, trunk_);
   }
   return is_good;
 }

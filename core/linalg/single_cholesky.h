@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -20,8 +21,9 @@ class SingleCholesky {
   explicit SingleCholesky(const SupernodePattern& supernodes);
 
   /// False if a pivot is not above 1e-6 of its diagonal entry, because no correct digit of the pivot would be left.
-  /// Then result() must not be used.
-  [[nodiscard]] bool factor(const SymmetricRows& matrix, const Workers& workers);
+  /// Then result() must not be used. Up to `most_raised` such pivots, if they are not below -1e-6 of it, are raised to 1e-6 instead: the
+  /// factor is then that of a matrix with as many larger diagonal entries.
+  [[nodiscard]] bool factor(const SymmetricRows& matrix, const Workers& workers, int most_raised = 0);
 
   const SingleFactor& result() const { return factor_; }
 
@@ -45,7 +47,8 @@ class SingleCholesky {
   void load(std::size_t node, const SymmetricRows& matrix, Scratch& own);
   void update_rows(std::size_t node, std::size_t begin, std::size_t end,
                    const std::vector<std::int32_t>& place);
-  bool eliminate(std::size_t node, const SymmetricRows& matrix, const Workers& workers, Scratch& own);
+  bool eliminate(std::size_t node, const SymmetricRows& matrix, const Workers& workers,
+                 std::atomic<int>& raisable, Scratch& own);
 
   SingleFactor factor_;
   std::vector<std::int32_t> old_to_new_;

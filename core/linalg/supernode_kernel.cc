@@ -169,7 +169,7 @@ void subtract_update(const EliminatedRows& from, std::size_t target_count, std::
   (from, target_count, begin, end, place, first_column, block, stride, scratch);
 }
 
-bool SolvingTriangle::factor(float* triangle, std::size_t columns, const float* lowest) {
+bool SolvingTriangle::factor(float* triangle, std::size_t columns, const float* lowest, int* raised) {
   columns_ = columns;
   stride_ = HWY_DYNAMIC_DISPATCH(PaddedColumns)(columns);
   transposed_.assign(columns * stride_, 0);
@@ -185,7 +185,12 @@ bool SolvingTriangle::factor(float* triangle, std::size_t columns, const float* 
       (row_.data(), r, stride_, transposed_.data(), inverse_diagonal_.data());
       for (std::size_t c = 0; c < r; ++c) pivot -= row_[c] * row_[c];
     }
-    if (!(pivot > lowest[r])) return false;
+    if (!(pivot > lowest[r])) {
+      const bool is_rounding = pivot > -lowest[r] && std::isfinite(lowest[r]);
+      if (raised == nullptr || !is_rounding) return false;
+      pivot = lowest[r];
+      ++*raised;
+    }
     inverse_diagonal_[r] = 1 / std::sqrt(pivot);
     std::copy_n(row_.begin(), r, row);
     row[r] = inverse_diagonal_[r];

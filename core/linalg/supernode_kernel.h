@@ -25,8 +25,9 @@ void subtract_update(const EliminatedRows& from, std::size_t target_count, std::
 class SolvingTriangle {
  public:
   /// Replaces the symmetric matrix whose lower triangle is in `triangle`, row-major, by its Cholesky factor with the
-  /// diagonal inverted. False if a pivot is not above `lowest[c]` or is NaN.
-  [[nodiscard]] bool factor(float* triangle, std::size_t columns, const float* lowest);
+  /// diagonal inverted. False if a pivot is not above `lowest[c]` or is NaN. If `raised` is not null, pivots within
+  /// `lowest[c]` of zero are raised to it instead, and counted there.
+  [[nodiscard]] bool factor(float* triangle, std::size_t columns, const float* lowest, int* raised = nullptr);
 
   /// Replaces each of `row_count` rows b, of as many columns as the triangle, by the x with L x = b. Call factor()
   /// first. `scratch` grows as needed.

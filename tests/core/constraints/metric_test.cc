@@ -137,6 +137,31 @@ TEST_F(MetricTest, SolvesWhereSinglePrecisionDoesNotCarryTheMatrix) {
   EXPECT_LT((x - b).norm(), 1e-6 * b.norm());
 }
 
+TEST_F(MetricTest, HoldsNoDoubleFactorForARoughOne) {
+  std::fill(is_held.begin(), is_held.end(), false);
+  const auto& z = shape->scaled_positions().col(2);
+  for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+    is_held[i] = z[i] == z.minCoeff();
+    cell_weights[i] = z[i] == z.maxCoeff() ? 1 : 1e-8;
+  }
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1), Metric::Precision::kRough));
+  const std::size_t rough = metric.memory_bytes();
+  Points b = Points::Random(shape->vertex_count(), 3), x, exact;
+  clear_held(b);
+  metric.precondition(b, x, Workers(1));
+  EXPECT_TRUE(x.allFinite());
+  EXPECT_GT(x.cwiseProduct(b).sum(), 0);  // it is still positive definite
+  EXPECT_EQ(metric.memory_bytes(), rough);
+  metric.solve(b, exact, Workers(1));  // by another factor
+  exact = apply(exact);
+  clear_held(exact);
+  EXPECT_LT((exact - b).norm(), 1e-6 * b.norm());
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  EXPECT_GT(metric.memory_bytes(), 1.5 * static_cast<double>(rough));
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1), Metric::Precision::kRough));
+  EXPECT_EQ(metric.memory_bytes(), rough);
+}
+
 TEST_F(MetricTest, GivesTheDoubleFactorBackWhenItIsNotWanted) {
   ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
   const std::size_t before = metric.memory_bytes();

@@ -107,6 +107,33 @@ TEST(SingleCholesky, RefusesWhatSinglePrecisionDoesNotCarry) {
   EXPECT_FALSE(analysed(matrix).factor(RowsOf(matrix), Workers(1)));
 }
 
+/// Chains that nothing holds: each has a pivot of zero, because a constant on one of them costs nothing.
+Eigen::MatrixXd loose_chains(int count, int length) {
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(count * length, count * length);
+  for (int k = 0; k + 1 < count * length; ++k) {
+    if ((k + 1) % length != 0) result.block<2, 2>(k, k) += Eigen::Matrix2d{{1, -1}, {-1, 1}};
+  }
+  return result;
+}
+
+TEST(SingleCholesky, RaisesAFewPivotsIfThatIsWanted) {
+  const Eigen::MatrixXd a = loose_chains(3, 50);
+  const LowerMatrix matrix = lower(a);
+  SingleCholesky single = analysed(matrix);
+  EXPECT_FALSE(single.factor(RowsOf(matrix), Workers(2)));
+  Points b = Points::Random(150, 3), x;
+  for (int chain = 0; chain < 3; ++chain) {
+    const Eigen::RowVector3d mean = b.middleRows(50 * chain, 50).colwise().mean();
+    b.middleRows(50 * chain, 50).rowwise() -= mean;
+  }
+  for (const int threads : {1, 2, 4}) {
+    EXPECT_FALSE(single.factor(RowsOf(matrix), Workers(threads), 2)) << threads;
+    ASSERT_TRUE(single.factor(RowsOf(matrix), Workers(threads), 3)) << threads;
+    single.result().solve(b, x, Workers(threads));
+    EXPECT_LT((a * x - b).norm(), 1e-3 * b.norm()) << threads;
+  }
+}
+
 TEST(SupernodePattern, IsRefusedWhereTheFactorIsTooLarge) {
   const LowerMatrix matrix = square_laplacian(30);
   const std::size_t entries = entry_count(analyse_supernodes(matrix).value());

@@ -7,8 +7,10 @@
 #include <hwy/highway.h>
 
 #include <Eigen/Cholesky>
+#include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/core/every_instruction_set.h"
@@ -78,6 +80,24 @@ TEST_P(SupernodeKernel, RefusesPivotsThatAreTooSmall) {
   std::vector<float> triangle = {1, 0, kNaN, 2};
   const std::vector<float> lowest = {1e-6f, 1e-6f};
   EXPECT_FALSE(SolvingTriangle().factor(triangle.data(), 2, lowest.data()));
+}
+
+TEST_P(SupernodeKernel, RaisesPivotsThatAreNearZeroIfThatIsWanted) {
+  for (const float pivot : {1.0f, 1.0f - 5e-7f, 1.0f + 5e-7f}) {
+    std::vector<float> triangle = {1, 0, 1, pivot};
+    const std::vector<float> lowest = {1e-6f, 1e-6f};
+    int raised = 3;
+    EXPECT_TRUE(SolvingTriangle().factor(triangle.data(), 2, lowest.data(), &raised)) << pivot;
+    EXPECT_EQ(raised, 4);
+    EXPECT_FLOAT_EQ(triangle[3], 1e3f);  // 1 / sqrt(1e-6)
+  }
+  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN(), kInfinite = HUGE_VALF;
+  for (const auto& [pivot, least] : {std::pair{1.0f - 1e-5f, 1e-6f}, {kNaN, 1e-6f}, {kInfinite, kInfinite}}) {
+    std::vector<float> triangle = {1, 0, 1, pivot};
+    const std::vector<float> lowest = {1e-6f, least};
+    int raised = 0;
+    EXPECT_FALSE(SolvingTriangle().factor(triangle.data(), 2, lowest.data(), &raised)) << pivot;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Targets, SupernodeKernel, testing::ValuesIn(instruction_sets()), by_its_name);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/energy/cell_pass.h"
+#include "tests/core/multiresolution/keeping_solver.h"
 #include "tests/core/poses.h"
 
 namespace lpdeform {
@@ -52,46 +53,6 @@ class GradedLevelTest : public testing::Test {
     result.keep_trace = true;
     return result;
   }
-};
-
-/// A solver that only keeps what it is given.
-class KeepingSolver : public LevelSolver {
- public:
-  KeepingSolver(std::shared_ptr<const RestShape> level, Field* bending)
-      : positions_(level->positions()),
-        rotations_(level->vertex_count(), Eigen::Matrix3d::Identity()),
-        bending_(bending) {}
-
-  absl::Status set_material(const Material& /*material*/) override { return absl::OkStatus(); }
-  void set_bending(const Field& shares) override { *bending_ = shares; }
-  void displace(const Points& /*by*/) override {}
-  std::optional<double> least_energy(InitialGuess /*initial*/, std::stop_token /*stop*/) override {
-    return std::nullopt;
-  }
-  absl::Status set_handles(const HandleSet& /*handles*/) override { return absl::OkStatus(); }
-  absl::Status set_positions(const Points& positions) override {
-    positions_ = positions;
-    return absl::OkStatus();
-  }
-  absl::Status start(const SolveSettings& /*settings*/, std::stop_token /*stop*/) override {
-    return absl::OkStatus();
-  }
-  absl::Status start_prepared(const SolveSettings& /*settings*/, std::stop_token /*stop*/) override {
-    return absl::OkStatus();
-  }
-  bool step() override { return false; }
-  void catch_up(bool /*is_last*/) override {}
-  int iterations() const override { return 0; }
-  bool has_found_lower() const override { return false; }
-  const Points& positions() const override { return positions_; }
-  double energy() const override { return 0; }
-  std::vector<Eigen::Matrix3d> rotations() override { return rotations_; }
-  std::size_t memory_bytes() const override { return 0; }
-
- private:
-  Points positions_;
-  std::vector<Eigen::Matrix3d> rotations_;
-  Field* bending_;
 };
 
 /// While a graded level runs, the fine level waits: its records have the same energy.
@@ -341,7 +302,7 @@ TEST_F(GradedLevelTest, HasTheVerticesWhereTheDistortionIs) {
   Field bending;
   const MakeLevelSolver make = [&](std::shared_ptr<const RestShape> level) -> std::unique_ptr<LevelSolver> {
     graded = level;
-    return std::make_unique<KeepingSolver>(std::move(level), &bending);
+    return std::make_unique<KeepingSolver>(*level, &bending);
   };
   const auto coarse = CoarseLevel::create(*shape, CoarseLevel::coarsened(*shape), make);
   const Constraints constraints = make_constraints(*shape, fold(), FreeComponents::kError).value();
