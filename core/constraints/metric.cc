@@ -59,7 +59,9 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
   for (MatrixEntry& entry : scaled) entry.value /= largest;
   scale_ = largest;
   const bool is_same = is_good_ && is_held == is_held_ && clipped == cell_weights_ && scaled == entries_;
-  if (is_same && precision == precision_) return true;  // a new factorisation would give the same
+  const bool does_both = is_single_current_ && is_precise() && precision != Precision::kDouble;
+  if (is_same && (precision == precision_ || does_both))
+    return true;  // a new factorisation would give the same
   if (!is_same) {
     cell_weights_ = std::move(clipped);
     is_held_ = is_held;

@@ -38,7 +38,7 @@ class Metric {
 
   /// What a factorisation is for.
   enum class Precision {
-    kRough,  // only for precondition(): as kSingle, but with a few pivots raised where its digits do not suffice
+    kRough,  // only for precondition(): as kSingle, but where its digits do not carry up to ten pivots, they are raised
     kSingle,  // mainly for precondition(): several times as fast, half the memory
     kDouble,  // mainly for solve()
   };
@@ -55,8 +55,8 @@ class Metric {
   /// factorisation stays well conditioned if some cells have no weight. False if the factorisation fails. The present
   /// factor is kept if held vertices, precision and, up to a common factor, cell weights and entries are the same.
   /// `entries` form a positive semidefinite matrix; entries of vertex pairs without an edge go to the diagonal. If the
-  /// matrix cannot be factored in single precision, double is used, which takes three to four times the memory. The same
-  /// bits on any number of threads.
+  /// matrix cannot be factored in single precision, double is used; memory_bytes() is then two to four times as high. The same bits on any
+  /// number of threads.
   [[nodiscard]] bool factor(const std::vector<double>& cell_weights, const std::vector<char>& is_held,
                             const std::vector<MatrixEntry>& entries, const Workers& workers,
                             Precision precision = Precision::kSingle);
@@ -64,6 +64,10 @@ class Metric {
   /// Keeps using the last factor for these cell weights, scaled so that the sums of the weights agree. For a metric
   /// that need not be exact. Requires is_factored_for().
   void adopt(const std::vector<double>& cell_weights);
+
+  /// Whether the factor is that of M to its precision. Otherwise pivots were raised (Precision::kRough): precondition() and extend() then belong
+  /// to M with a few larger diagonal entries.
+  bool is_precise() const { return !is_single_current_ || single_.raised() == 0; }
 
   /// Whether the last factor() was for these held vertices and succeeded.
   bool is_factored_for(const std::vector<char>& is_held) const { return is_good_ && is_held == is_held_; }

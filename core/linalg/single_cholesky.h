@@ -26,6 +26,8 @@ class SingleCholesky {
   [[nodiscard]] bool factor(const SymmetricRows& matrix, const Workers& workers, int most_raised = 0);
 
   const SingleFactor& result() const { return factor_; }
+  /// How many pivots the last factor() has raised.
+  int raised() const { return raised_; }
 
   std::size_t memory_bytes() const;
 
@@ -55,6 +57,7 @@ class SingleCholesky {
   std::vector<Update> updates_;
   std::vector<std::size_t> first_update_;  // of each supernode; the last entry is the end
   std::vector<double> update_work_;        // of each supernode: multiplications
+  int raised_ = 0;
   Scratch trunk_;  // not shared with scratch_of_thread(): a waiting thread may start on another factorisation
 };
 

@@ -67,6 +67,7 @@ struct Deformer::Impl {
   bool make_coarse();
   bool prepare_coarse();
   std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, Warmth warmth);
+  bool is_metric_usable() const;
   bool prepare_metric(bool needs_plain_weights);
   void keep_if_best(double sum);
   void keep(const Points& from, double sum);

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <utility>
+#include <vector>
+
 #include "tests/core/poses.h"
 
 namespace lpdeform {
@@ -138,13 +142,13 @@ TEST_F(MetricTest, SolvesWhereSinglePrecisionDoesNotCarryTheMatrix) {
 }
 
 TEST_F(MetricTest, HoldsNoDoubleFactorForARoughOne) {
-  std::fill(is_held.begin(), is_held.end(), false);
-  const auto& z = shape->scaled_positions().col(2);
+  const Eigen::RowVector3d heavy(1, 0, 2);
   for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
-    is_held[i] = z[i] == z.minCoeff();
-    cell_weights[i] = z[i] == z.maxCoeff() ? 1 : 1e-8;
+    is_held[i] = shape->positions()(i, 2) == 0;
+    cell_weights[i] = shape->positions().row(i) == heavy ? 1 : 1e-8;
   }
   ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1), Metric::Precision::kRough));
+  EXPECT_FALSE(metric.is_precise());
   const std::size_t rough = metric.memory_bytes();
   Points b = Points::Random(shape->vertex_count(), 3), x, exact;
   clear_held(b);
@@ -160,6 +164,38 @@ TEST_F(MetricTest, HoldsNoDoubleFactorForARoughOne) {
   EXPECT_GT(metric.memory_bytes(), 1.5 * static_cast<double>(rough));
   ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1), Metric::Precision::kRough));
   EXPECT_EQ(metric.memory_bytes(), rough);
+}
+
+/// A long box, held at its bottom. Single cells weigh much, and those around them next to nothing: a vertex and its neighbours hang together, and
+/// hardly on anything else.
+TEST(MetricOfLooseCells, RaisesAFewPivotsButNotMany) {
+  for (const auto& [count, is_rough] : {std::pair{8, true}, {20, false}}) {
+    const auto shape = rest_shape(box_surface(2, 2, 4 * count + 2));
+    std::vector<char> is_held(shape->vertex_count());
+    std::vector<double> cell_weights(shape->vertex_count());
+    for (std::int32_t i = 0; i < shape->vertex_count(); ++i) {
+      const auto at = shape->positions().row(i);
+      is_held[i] = at[2] == 0;
+      cell_weights[i] = at[0] == 1 && at[1] == 0 && at[2] > 0 && std::lround(at[2]) % 4 == 0 ? 1 : 1e-8;
+    }
+    Metric metric = Metric::create(shape).value();
+    ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1), Metric::Precision::kRough));
+    EXPECT_EQ(metric.is_precise(), !is_rough) << count;
+    const std::size_t bytes = metric.memory_bytes();
+    ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+    EXPECT_TRUE(metric.is_precise());
+    EXPECT_EQ(metric.memory_bytes() > 1.5 * static_cast<double>(bytes), is_rough) << count;
+  }
+}
+
+TEST_F(MetricTest, KeepsAFactorThatServesAnotherPrecision) {
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  const auto version = metric.version();
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1), Metric::Precision::kRough));
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
+  EXPECT_EQ(metric.version(), version);
+  ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1), Metric::Precision::kDouble));
+  EXPECT_GT(metric.version(), version);
 }
 
 TEST_F(MetricTest, GivesTheDoubleFactorBackWhenItIsNotWanted) {

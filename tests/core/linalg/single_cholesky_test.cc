@@ -107,30 +107,47 @@ TEST(SingleCholesky, RefusesWhatSinglePrecisionDoesNotCarry) {
   EXPECT_FALSE(analysed(matrix).factor(RowsOf(matrix), Workers(1)));
 }
 
-/// Chains that nothing holds: each has a pivot of zero, because a constant on one of them costs nothing.
-Eigen::MatrixXd loose_chains(int count, int length) {
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(count * length, count * length);
-  for (int k = 0; k + 1 < count * length; ++k) {
-    if ((k + 1) % length != 0) result.block<2, 2>(k, k) += Eigen::Matrix2d{{1, -1}, {-1, 1}};
+/// Stars that nothing holds: each has a pivot of zero, because a constant on one of them costs nothing.
+LowerMatrix loose_stars(int count, int leaves) {
+  LowerMatrix result;
+  for (int star = 0; star < count; ++star) {
+    const std::int32_t centre = (star + 1) * (leaves + 1) - 1;
+    for (std::int32_t leaf = centre - leaves; leaf <= centre; ++leaf) {
+      result.columns.push_back(static_cast<std::int32_t>(result.rows.size()));
+      result.rows.push_back(leaf);
+      result.values.push_back(leaf == centre ? leaves : 1);
+      if (leaf == centre) continue;
+      result.rows.push_back(centre);
+      result.values.push_back(-1);
+    }
   }
+  result.columns.push_back(static_cast<std::int32_t>(result.rows.size()));
   return result;
 }
 
 TEST(SingleCholesky, RaisesAFewPivotsIfThatIsWanted) {
-  const Eigen::MatrixXd a = loose_chains(3, 50);
-  const LowerMatrix matrix = lower(a);
+  constexpr int kStars = 20, kLeaves = 4000, kSize = kLeaves + 1;
+  const LowerMatrix matrix = loose_stars(kStars, kLeaves);
   SingleCholesky single = analysed(matrix);
   EXPECT_FALSE(single.factor(RowsOf(matrix), Workers(2)));
-  Points b = Points::Random(150, 3), x;
-  for (int chain = 0; chain < 3; ++chain) {
-    const Eigen::RowVector3d mean = b.middleRows(50 * chain, 50).colwise().mean();
-    b.middleRows(50 * chain, 50).rowwise() -= mean;
+  Points b = Points::Random(matrix.size(), 3), x, of_one_thread;
+  for (int star = 0; star < kStars; ++star) {
+    const Eigen::RowVector3d mean = b.middleRows(kSize * star, kSize).colwise().mean();
+    b.middleRows(kSize * star, kSize).rowwise() -= mean;
   }
   for (const int threads : {1, 2, 4}) {
-    EXPECT_FALSE(single.factor(RowsOf(matrix), Workers(threads), 2)) << threads;
-    ASSERT_TRUE(single.factor(RowsOf(matrix), Workers(threads), 3)) << threads;
+    EXPECT_FALSE(single.factor(RowsOf(matrix), Workers(threads), kStars - 1)) << threads;
+    ASSERT_TRUE(single.factor(RowsOf(matrix), Workers(threads), kStars)) << threads;
+    EXPECT_EQ(single.raised(), kStars);
     single.result().solve(b, x, Workers(threads));
-    EXPECT_LT((a * x - b).norm(), 1e-3 * b.norm()) << threads;
+    if (threads == 1) of_one_thread = x;
+    EXPECT_EQ(x, of_one_thread) << threads;
+  }
+  for (std::int32_t leaf = 0; leaf < matrix.size(); ++leaf) {
+    const std::int32_t centre = (leaf / kSize + 1) * kSize - 1;
+    if (leaf == centre) continue;
+    const Eigen::RowVector3d residual = x.row(leaf) - x.row(centre) - b.row(leaf);
+    ASSERT_LT(residual.norm(), 1e-5 * (1 + x.row(centre).norm())) << leaf;
   }
 }
 

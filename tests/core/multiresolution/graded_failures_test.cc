@@ -18,6 +18,7 @@ namespace lpdeform {
 namespace {
 
 constexpr double kP = 1.5;
+constexpr double kMostRise = 1.2;  // of the sum of E_i^p in one step
 
 class RefusingSolver : public KeepingSolver {
  public:
@@ -74,6 +75,9 @@ class GradedFailuresTest : public testing::Test {
       }
       if (step > 0 && now.stage == before.stage) {
         EXPECT_LE(now.objective, before.objective * (1 + 1e-12)) << "step " << step;
+      }
+      if (step > 1) {  // from one stage to the next, too
+        EXPECT_LE(*now.true_sum, kMostRise * *before.true_sum) << "step " << step;
       }
     }
     EXPECT_EQ(now.outcome, Outcome::kConverged);

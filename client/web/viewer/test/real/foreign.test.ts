@@ -33,6 +33,8 @@ afterAll(async () => {
 });
 
 const notice = (words: string) => user.page.locator(".notice", { hasText: words }).first().waitFor({ timeout: 15_000 });
+/** Takes away what the page said before. */
+const forgetNotice = () => user.page.evaluate("window.__lpdeform.app.facts.set({ notice: undefined })");
 
 describe("the viewer", () => {
   it("loads the readers of other formats with the first such file, and not before, in a worker", async () => {
@@ -106,6 +108,7 @@ describe("the viewer", () => {
   it("loads nothing that a file names, and says what is left out", async () => {
     const asked: string[] = [];
     user.page.on("request", (request) => asked.push(request.url()));
+    await forgetNotice();
     await user.openFiles({ name: "tube.dae", content: files["tube.dae"] });
     await notice("Left out: textures.");
     expect(asked.filter((url) => url.includes("example") || url.includes("a.png"))).toEqual([]);
@@ -135,6 +138,7 @@ describe("the viewer", () => {
     ["a.fbx", makeBinaryFbx(7500, 63e6), "a.fbx cannot be read as FBX: unpacked it has 50"],
     ["a.fbx", makeBinaryFbx(7400, 30e6, 33e6), "a.fbx cannot be read as FBX: unpacked it has 50"], // each is allowed by itself
   ])("refuses %s with a sentence", async (name, content, words) => {
+    await forgetNotice(); // several have the same words
     await user.openFiles({ name, content });
     await notice(words);
     expect(user.errors).toEqual([]);
