@@ -11,7 +11,6 @@ namespace {
 constexpr int kPasses = 12;
 constexpr double kRefined = 1e-12;  // refinement ends when the correction's share of the result is <= this
 constexpr std::size_t kBytesPerEntry = 20;  // per matrix entry: what the factor has besides its values
-constexpr int kMostRaised = 10;             // pivots, with Precision::kRough
 constexpr double kSlowest = 0.3;            // the largest ratio of a correction to the previous one
 
 LowerMatrix lower_pattern(const RestShape& shape) {
@@ -59,9 +58,7 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
   for (MatrixEntry& entry : scaled) entry.value /= largest;
   scale_ = largest;
   const bool is_same = is_good_ && is_held == is_held_ && clipped == cell_weights_ && scaled == entries_;
-  const bool does_both = is_single_current_ && is_precise() && precision != Precision::kDouble;
-  if (is_same && (precision == precision_ || does_both))
-    return true;  // a new factorisation would give the same
+  if (is_same && precision == precision_) return true;  // a new factorisation would give the same
   if (!is_same) {
     cell_weights_ = std::move(clipped);
     is_held_ = is_held;
@@ -72,8 +69,7 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
   precision_ = precision;
   is_single_current_ = is_double_current_ = false;
   ++version_;
-  const int most_raised = precision == Precision::kRough ? kMostRaised : 0;
-  if (precision != Precision::kDouble && single_.factor(Rows(*this), workers, most_raised)) {
+  if (precision == Precision::kSingle && single_.factor(Rows(*this), workers, most_raised_)) {
     double_.reset();  // takes several times the memory
     copy_ = {};
     matrix_ = {};

@@ -38,7 +38,6 @@ class Metric {
 
   /// What a factorisation is for.
   enum class Precision {
-    kRough,  // only for precondition(): as kSingle, but where its digits do not carry up to ten pivots, they are raised
     kSingle,  // mainly for precondition(): several times as fast, half the memory
     kDouble,  // mainly for solve()
   };
@@ -61,13 +60,13 @@ class Metric {
                             const std::vector<MatrixEntry>& entries, const Workers& workers,
                             Precision precision = Precision::kSingle);
 
+  /// From now on, factor() in single precision raises up to ten pivots that are zero to rounding (SingleCholesky::factor), before it takes
+  /// double precision. The factor, and so precondition() and extend(), then belongs to M with a few larger diagonal entries. solve() stays as accurate.
+  void raise_few_pivots() { most_raised_ = kMostRaised; }
+
   /// Keeps using the last factor for these cell weights, scaled so that the sums of the weights agree. For a metric
   /// that need not be exact. Requires is_factored_for().
   void adopt(const std::vector<double>& cell_weights);
-
-  /// Whether the factor is that of M to its precision. Otherwise pivots were raised (Precision::kRough): precondition() and extend() then belong
-  /// to M with a few larger diagonal entries.
-  bool is_precise() const { return !is_single_current_ || single_.raised() == 0; }
 
   /// Whether the last factor() was for these held vertices and succeeded.
   bool is_factored_for(const std::vector<char>& is_held) const { return is_good_ && is_held == is_held_; }
@@ -109,6 +108,7 @@ class Metric {
 
  private:
   static constexpr std::size_t kChunk = 4096;  // vertices
+  static constexpr int kMostRaised = 10;
 
   /// A row of M / scale_.
   class Rows : public SymmetricRows {
@@ -147,6 +147,7 @@ class Metric {
   std::uint64_t version_ = 0;
   mutable LowerMatrix matrix_;  // see need_matrix()
   SingleCholesky single_;
+  int most_raised_ = 0;
   Precision precision_ = Precision::kSingle;  // the requested one
   bool is_single_current_ = false;
   mutable std::optional<SparseCholesky> double_;  // made when first needed

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <system_error>
 
 #include "absl/strings/escaping.h"
@@ -21,7 +22,9 @@ std::optional<std::string> percent_decoded(std::string_view uri) {
     const std::string_view digits = uri.substr(k + 1, 2);
     const auto is_digit = [](char c) { return std::isxdigit(static_cast<unsigned char>(c)) != 0; };
     if (digits.size() < 2 || !std::ranges::all_of(digits, is_digit)) return std::nullopt;
-    text += absl::HexStringToBytes({digits.data(), digits.size()});
+    unsigned char byte = 0;
+    std::from_chars(digits.data(), digits.data() + digits.size(), byte, 16);
+    text += static_cast<char>(byte);
     k += 2;
   }
   if (text.find('\0') != std::string::npos) return std::nullopt;

@@ -187,7 +187,6 @@ bool SingleCholesky::factor(const SymmetricRows& matrix, const Workers& workers,
     for (std::int32_t node = first; node <= last && is_good; ++node)
       is_good = eliminate(static_cast<std::size_t>(node), matrix, workers, raisable, trunk_);
   }
-  raised_ = most_raised - std::max(0, raisable.load());
   return is_good;
 }
 

@@ -21,13 +21,11 @@ class SingleCholesky {
   explicit SingleCholesky(const SupernodePattern& supernodes);
 
   /// False if a pivot is not above 1e-6 of its diagonal entry, because no correct digit of the pivot would be left.
-  /// Then result() must not be used. Up to `most_raised` such pivots, if they are not below -1e-6 of it, are raised to 1e-6 instead: the
+  /// Then result() must not be used. Up to `most_raised` such pivots, if they are not below -1e-6 of it, are raised to 1e-6 of it instead: the
   /// factor is then that of a matrix with as many larger diagonal entries.
   [[nodiscard]] bool factor(const SymmetricRows& matrix, const Workers& workers, int most_raised = 0);
 
   const SingleFactor& result() const { return factor_; }
-  /// How many pivots the last factor() has raised.
-  int raised() const { return raised_; }
 
   std::size_t memory_bytes() const;
 
@@ -57,7 +55,6 @@ class SingleCholesky {
   std::vector<Update> updates_;
   std::vector<std::size_t> first_update_;  // of each supernode; the last entry is the end
   std::vector<double> update_work_;        // of each supernode: multiplications
-  int raised_ = 0;
   Scratch trunk_;  // not shared with scratch_of_thread(): a waiting thread may start on another factorisation
 };
 

@@ -176,7 +176,7 @@ bool QuasiNewton::refresh_metric() {
   since_refresh_ = 0;
   const auto version = problem_.metric.version();
   const double scale = problem_.metric.scale();
-  if (!problem_.factor_metric(metric_weights(), Metric::Precision::kRough)) return false;
+  if (!problem_.factor_metric(metric_weights(), Metric::Precision::kSingle)) return false;
   if (problem_.metric.version() == version && problem_.metric.scale() == scale) return true;
   memory_.clear();
   if (step_length_ == 0) return true;

@@ -98,15 +98,10 @@ std::unique_ptr<Minimiser> Deformer::Impl::make_minimiser(Method method, Points 
   return std::make_unique<QuasiNewton>(std::move(problem), std::move(guess), warmth);
 }
 
-/// Whether a guess can be made with the factor that the last solve has left.
-bool Deformer::Impl::is_metric_usable() const {
-  return metric.is_factored_for(constraints->is_held) && metric.is_precise();
-}
-
 /// Factors the metric for the current handles with equal cell weights, unless there is a usable factor. False if that
 /// fails.
 bool Deformer::Impl::prepare_metric(bool needs_plain_weights) {
-  if (is_metric_usable() && !needs_plain_weights) return true;
+  if (metric.is_factored_for(constraints->is_held) && !needs_plain_weights) return true;
   std::vector<MatrixEntry> entries = guess_springs().matrix_entries();
   constraints->linear.add_ties(2, entries);
   const auto precision =
@@ -222,7 +217,8 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   }
   if (!settings.effort) settings.effort = default_effort(is_warm);
   summary.effort = *settings.effort;
-  const bool keeps_metric = is_warm && factor == Factor::kQuasiNewton && is_metric_usable();
+  const bool keeps_metric =
+      is_warm && factor == Factor::kQuasiNewton && metric.is_factored_for(constraints->is_held);
   warmth = keeps_metric  ? Warmth::kWithMetric
            : is_warm     ? Warmth::kWarm
            : is_prepared ? Warmth::kPrepared

@@ -62,12 +62,11 @@ struct Deformer::Impl {
   bool is_near(double least, double times) const;
   bool is_guess_good_enough() const;
   Method chosen_method(Method asked, bool is_warm);
-  MakeLevelSolver level_maker() const;
+  MakeLevelSolver level_maker(bool is_graded) const;
   std::optional<Grading> grading() const;
   bool make_coarse();
   bool prepare_coarse();
   std::unique_ptr<Minimiser> make_minimiser(Method method, Points guess, Warmth warmth);
-  bool is_metric_usable() const;
   bool prepare_metric(bool needs_plain_weights);
   void keep_if_best(double sum);
   void keep(const Points& from, double sum);

@@ -58,9 +58,10 @@ class DeformerOfLevel : public LevelSolver {
 
 }  // namespace
 
-/// Makes the solvers of levels. They have no graded levels themselves.
-MakeLevelSolver Deformer::Impl::level_maker() const {
-  return [this](std::shared_ptr<const RestShape> level) -> std::unique_ptr<LevelSolver> {
+/// Makes the solvers of levels. They have no graded levels themselves. The metric of a graded level may be rough: its triangles between fine and
+/// coarse parts can be thin, and a factor in double precision would take memory that nobody has admitted.
+MakeLevelSolver Deformer::Impl::level_maker(bool is_graded) const {
+  return [this, is_graded](std::shared_ptr<const RestShape> level) -> std::unique_ptr<LevelSolver> {
     const DeformerOptions of_level{.free_components = FreeComponents::kStay,
                                    .threads = workers().threads(),
                                    .search_up_to = kLargestSearchedLevel,
@@ -68,7 +69,9 @@ MakeLevelSolver Deformer::Impl::level_maker() const {
                                    .graded_from = kNever,
                                    .late_graded_from = kNever};
     auto deformer = Deformer::create(std::move(level), of_level);
-    return deformer.ok() ? std::make_unique<DeformerOfLevel>(*std::move(deformer)) : nullptr;
+    if (!deformer.ok()) return nullptr;
+    if (is_graded) (*deformer)->impl_->metric.raise_few_pivots();
+    return std::make_unique<DeformerOfLevel>(*std::move(deformer));
   };
 }
 
@@ -77,14 +80,14 @@ std::optional<Grading> Deformer::Impl::grading() const {
   const bool is_early = shape->vertex_count() >= options.graded_from;
   const bool may_come_late = shape->vertex_count() >= options.late_graded_from;
   if (!(is_early || may_come_late) || shape->weight_kind() == WeightKind::kUniform) return std::nullopt;
-  return Grading{handles, effective_material(), level_maker(), is_early, may_come_late};
+  return Grading{handles, effective_material(), level_maker(true), is_early, may_come_late};
 }
 
 /// Makes the coarse level if there is none. False if the mesh cannot be coarsened, which is tried once.
 bool Deformer::Impl::make_coarse() {
   if (!coarse && !is_coarsest) {
     CoarseMesh mesh = coarse_mesh ? *std::exchange(coarse_mesh, {}) : CoarseLevel::coarsened(*shape);
-    coarse = CoarseLevel::create(*shape, std::move(mesh), level_maker());
+    coarse = CoarseLevel::create(*shape, std::move(mesh), level_maker(false));
     is_coarsest = coarse == nullptr;
   }
   return coarse != nullptr;

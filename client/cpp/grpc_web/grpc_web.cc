@@ -1,5 +1,6 @@
 #include "client/cpp/grpc_web/grpc_web.h"
 
+#include <charconv>
 #include <cstdint>
 
 #include "absl/strings/ascii.h"
@@ -30,8 +31,14 @@ std::string percent_decoded(std::string_view text) {
   for (std::size_t k = 0; k < text.size(); ++k) {
     const bool is_escape = text[k] == '%' && k + 2 < text.size() && absl::ascii_isxdigit(text[k + 1]) &&
                            absl::ascii_isxdigit(text[k + 2]);
-    out += is_escape ? absl::HexStringToBytes(std::string(text.substr(k + 1, 2))) : std::string(1, text[k]);
-    if (is_escape) k += 2;
+    if (!is_escape) {
+      out += text[k];
+      continue;
+    }
+    unsigned char byte = 0;
+    std::from_chars(text.data() + k + 1, text.data() + k + 3, byte, 16);
+    out += static_cast<char>(byte);
+    k += 2;
   }
   return out;
 }
