@@ -20,6 +20,7 @@ import convex_step_test
 from convex_step_test import Cells, read_off
 
 EXACT = 1e-7  # of the energy
+SOLVED = 1e-8  # of the energy: how far clarabel's bounds of the optimum may lie apart
 ANGLE, CENTRE, SHIFT = 40, np.array([2, 2, 10.0]), np.array([0.3, -0.2, 0.4])
 AXIS = np.array([1, 2, 3]) / math.sqrt(14)
 WEIGHTS = {"soft": 2, "soft_point": 30, "orientation": 100}
@@ -35,10 +36,13 @@ def moved(point):
 
 
 class Program:
-    """min x.P.x / 2 + q.x over b - A x in cones, x the moves of free vertices from where they are and then the E_i."""
+    """min x.P.x / 2 + q.x over b - A x in cones, x the moves of free vertices from where they are and then the E_i.
 
-    def __init__(self, x, free, extra):
-        self.x, self.column = x, {v: 3 * k for k, v in enumerate(free)}
+    Lengths are in units of the root mean E_i^p, so that clarabel's numbers are near 1.
+    """
+
+    def __init__(self, free, extra):
+        self.free, self.column = free, {v: 3 * k for k, v in enumerate(free)}
         self.size, self.moves = 3 * len(free) + extra, 3 * len(free)
         self.entries, self.bounds, self.cones = [], [], []
         self.squares, self.constants = [], []
@@ -63,7 +67,8 @@ class Program:
         rows, columns, values = zip(*entries) if entries else ((), (), ())
         return sparse.csc_matrix((values, (rows, columns)), shape=shape)
 
-    def optimum(self, linear):
+    def solve(self, linear):
+        """The moves of the free vertices, and a lower bound of the optimum."""
         constants = np.array(self.constants)
         factor = self.matrix(self.squares, (len(constants), self.size))
         settings = clarabel.DefaultSettings()
@@ -75,8 +80,7 @@ class Program:
         solution = clarabel.DefaultSolver(sparse.triu(2 * factor.T @ factor).tocsc(), linear + 2 * factor.T @ constants,
                                           self.matrix(self.entries, (len(self.bounds), self.size)), np.array(self.bounds),
                                           self.cones, settings).solve()
-        assert str(solution.status) == "Solved", solution.status
-        return solution.obj_val + constants @ constants
+        return np.reshape(solution.x[:self.moves], (-1, 3)), solution.obj_val_dual + constants @ constants
 
 
 class HandleCertificates(unittest.TestCase):
@@ -143,24 +147,29 @@ class HandleCertificates(unittest.TestCase):
         corners = self.faces[point["face"]]
         return list(zip(corners.tolist(), point["barycentric"])), np.array(point["barycentric"]) @ self.rest[corners]
 
+    def energy(self, x, rotations, p, wishes):
+        scale = self.length_unit ** (p - 2)
+        soft = sum(w * np.sum((sum(share * x[v] for v, share in at) - to) ** 2) for at, to, w in wishes)
+        return np.sum(self.cells.energies(x, rotations) ** p) + scale * soft
+
     def checked(self, kind, p, options=()):
         x, report = self.deform(kind, p, options)
-        cells, rotations = self.cells, self.cells.rotations(x)
-        scale = self.length_unit ** (p - 2)
-        wishes = self.wishes(kind)
-        energy = np.sum(cells.energies(x, rotations) ** p)
-        energy += scale * sum(w * np.sum((sum(share * x[v] for v, share in at) - to) ** 2) for at, to, w in wishes)
+        cells, rotations, wishes = self.cells, self.cells.rotations(x), self.wishes(kind)
+        energy = self.energy(x, rotations, p, wishes)
         self.assertAlmostEqual(report["energy"] / energy, 1, delta=1e-9)
 
-        n, residuals = cells.count(), cells.residuals(x, rotations)
+        n = cells.count()
+        unit = np.mean(cells.energies(x, rotations) ** p) ** (1 / p)
+        residuals = cells.residuals(x, rotations) / unit
         free = np.setdiff1d(np.arange(n), self.low).tolist()
-        program = Program(x, free, n if p == 1 else 0)
+        program = Program(free, n if p == 1 else 0)
         for at, direction, to in self.equations(kind):
             terms = [(v, axis, share * direction[axis]) for v, share in at for axis in range(3)]
-            program.row(terms, to - sum(share * direction @ x[v] for v, share in at), sign=1)
+            program.row(terms, (to - sum(share * direction @ x[v] for v, share in at)) / unit, sign=1)
             program.cones.append(clarabel.ZeroConeT(1))
         for at, to, weight in wishes:
-            factor, off = math.sqrt(scale * weight), sum(share * x[v] for v, share in at) - to
+            factor = math.sqrt(self.length_unit ** (p - 2) * unit ** (2 - p) * weight)
+            off = (sum(share * x[v] for v, share in at) - to) / unit
             for axis in range(3):
                 program.square([(v, axis, factor * share) for v, share in at], factor * off[axis])
         edges = [((cells.i[e], 1), (cells.j[e], -1)) for e in range(len(cells.i))]
@@ -183,7 +192,14 @@ class HandleCertificates(unittest.TestCase):
         if not program.bounds:  # clarabel wants a row
             program.row([(free[0], 0, 0.0)], 0.0)
             program.cones.append(clarabel.ZeroConeT(1))
-        optimum = program.optimum(linear)
+        moves, below = program.solve(linear)
+        below *= unit ** p
+        found = x.copy()
+        found[free] += unit * moves
+        for at, direction, to in self.equations(kind):
+            self.assertLess(abs(sum(share * direction @ found[v] for v, share in at) - to), SOLVED * self.length_unit)
+        optimum = self.energy(found, rotations, p, wishes)
+        self.assertLess(abs(optimum - below), SOLVED * energy, "clarabel did not find the optimum")
         self.assertLessEqual(optimum, energy * (1 + EXACT))
         self.assertLessEqual(energy * (1 - report["optimality_gap"]), optimum + EXACT * energy)
         return report["optimality_gap"], (energy - optimum) / energy
