@@ -449,7 +449,7 @@ typedef struct lpdeform_settings {
    * are not read, and have their defaults. The energy has many minima where p is below 2. A session searches when nothing
    * changes for a second. lpdeform_solve searches with what is left of its limits, before it returns. */
   uint32_t set_search;
-  /* The number of further starts is 8 times the effort, 1 to 1000. -1: no search, the first minimum is taken. 0: the
+  /* The number of further starts is 12 times the effort, 1 to 1000. -1: no search, the first minimum is taken. 0: the
    * default, which is 1 if `method` is AUTO and p is below 2 somewhere, and for lpdeform_solve if it also starts cold;
    * otherwise there is no search. A start takes up to two or three times as long as the first minimum. Meshes of fewer than
    * 100 vertices are not searched. Meshes of more than 15,000 vertices are searched on their coarse levels, and only what

@@ -155,7 +155,7 @@ void add_solver_options(CLI::App& app, DeformOptions& options) {
       ->option_text("T");
   app.add_option(
          "--effort", options.effort,
-         "How far to look for lower minima, 0 to 1000: 8 times N further starts. 0 takes the first "
+         "How far to look for lower minima, 0 to 1000: 12 times N further starts. 0 takes the first "
          "minimum. Without this option: 1 with method auto where some p is below 2 and no --initial is "
          "given, otherwise 0")
       ->check(within(0, 1000))

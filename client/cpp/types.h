@@ -156,7 +156,7 @@ std::string stop_reason_name(StopReason reason);
 /// How far to look for lower minima once the first one is found. The energy is not convex: it has many minima, above all
 /// where p is below 2.
 struct MinimaSearch {
-  /// The number of further starts is 8 times the effort, 0 to 1000. 0 takes the first minimum. If left out: 1 if the
+  /// The number of further starts is 12 times the effort, 0 to 1000. 0 takes the first minimum. If left out: 1 if the
   /// method is kAuto and some p < 2, and for Session::solve if it also starts cold; otherwise 0. A start takes up to two
   /// or three times as long as the first minimum. Meshes of fewer than 100 vertices are not searched. Meshes of more than
   /// 15,000 vertices are searched on their coarse levels, and only what is lower there is tried on the mesh itself, as one

@@ -150,7 +150,7 @@ struct SolveOptions {
   double tolerance = 1e-5;      // of the relative decrease of the energy that is still expected; 1e-14 to 0.1
   int max_iterations = 100000;  // at least 0
   double time_limit_seconds = std::numeric_limits<double>::infinity();  // above 0
-  /// How far to look for lower minima: 8 further starts for each unit, 0 to 1000. Left out: 1 for the first solve if some
+  /// How far to look for lower minima: 12 further starts for each unit, 0 to 1000. Left out: 1 for the first solve if some
   /// p < 2 and the method is kAuto, otherwise 0.
   std::optional<int> effort = {};
   bool certify = false;  // fills SolveResult::optimality_gap

@@ -1,5 +1,6 @@
 #include "core/methods/minima_search.h"
 
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -8,6 +9,9 @@ namespace {
 
 constexpr double kComesNearer = 0.03;     // the least share of the difference to the lowest sum
 constexpr double kWorthFinishing = 1.02;  // a rough minimum's sum over the lowest, at most
+// A rough minimum is the lowest one if their sums differ by at most this share, and their root mean square distance is at most kNear
+// of the shape's size.
+constexpr double kSameSum = 1e-4, kNear = 1e-2;
 
 }  // namespace
 
@@ -33,9 +37,22 @@ bool MinimaSearch::is_hopeless() const {
   return sums_.front() - sums_.back() < kComesNearer * (sums_.back() - lowest_sum_);
 }
 
+/// Whether the rough minimum x with this true sum is the lowest one again.
+bool MinimaSearch::is_lowest_again(const Points& x, double sum) const {
+  if (!(std::abs(sum - lowest_sum_) <= kSameSum * lowest_sum_)) return false;
+  const double size2 = (lowest_.rowwise() - lowest_.colwise().mean()).squaredNorm();
+  return (x - lowest_).squaredNorm() <= kNear * kNear * size2;
+}
+
 void MinimaSearch::end_start(Outcome outcome) {
   const double sum = sums_.back();
   const bool is_minimum = outcome == Outcome::kConverged || outcome == Outcome::kStalled;
+  if (is_minimum && is_rough_ && is_lowest_again(minimiser_->x(), sum)) {
+    minima_.push_back(lowest_sum_);
+    minimiser_.reset();
+    ++number_;
+    return;
+  }
   if (is_minimum && is_rough_ && sum < kWorthFinishing * lowest_sum_) {
     Points rough = minimiser_->x();
     minimiser_.reset();  // two of them would take twice the memory

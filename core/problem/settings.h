@@ -58,7 +58,7 @@ struct SolveSettings {
   int max_iterations = 100000;                                          // >= 0
   double time_limit_seconds = std::numeric_limits<double>::infinity();  // of solving, without set-up; > 0
 
-  /// How far to look for lower minima once the first one is found: the number of further starts (MinimaSearch) is 8 times
+  /// How far to look for lower minima once the first one is found: the number of further starts (MinimaSearch) is 12 times
   /// this, 0 to kHighestEffort. 0 takes the first minimum. Not set: 1 for cold solves with kAuto if some p_i < 2, where there are
   /// many minima; otherwise 0. The search has what is left of the limits below, and a start takes up to two or three times as
   /// long as the first minimum. Meshes of fewer than 100 vertices are not searched. On meshes of over

@@ -107,7 +107,7 @@ class Deformer {
   /// Whether the current steps are those of a certificate; positions() then do not change any more.
   bool is_certifying() const;
 
-  static constexpr int kStartsOfEffort = 8;  // further starts for each unit of SolveSettings::effort
+  static constexpr int kStartsOfEffort = 12;  // further starts for each unit of SolveSettings::effort
   /// Begins to look for minima lower than positions(), which must be the result of a solve for the current inputs, from as many
   /// further starts as SolveSettings::effort says. A second call goes on with other starts; on a mesh larger than
   /// DeformerOptions::search_up_to it repeats the one by the coarse levels. step() continues the search. When step() returns

@@ -17,13 +17,13 @@ constexpr std::int32_t kSmallestMesh = 100;  // vertices; smaller ones have few 
 constexpr double kWork = 2e7;                // iterations times vertices of a start, at most
 
 /// Start k begins at the Laplacian deformation or at the lowest minimum, displaced by a share of the diagonal: at kOrigins[k mod
-/// 4]. No single one of them reaches the lowest minimum of every problem (tests/bench/tried.md, "Minima").
+/// 3]. Where `radius` is not 0, only the surroundings of one vertex are displaced, by a Gaussian of this share of the diagonal. No
+/// single one of them reaches the lowest minimum of every problem (tests/bench/tried.md, "Minima").
 struct Origin {
   bool is_lowest;
-  double share;
+  double share, radius;
 };
-constexpr std::array kOrigins = {Origin{false, 0.08}, Origin{true, 0.2}, Origin{false, 0.2},
-                                 Origin{true, 0.08}};
+constexpr std::array kOrigins = {Origin{true, 0.2, 0.15}, Origin{true, 0.2, 0}, Origin{false, 0.12, 0}};
 
 constexpr double kRoughTolerance = 1e-3;
 constexpr int kWaves = 6;
@@ -80,7 +80,8 @@ int Deformer::Impl::further_starts() const {
 }
 
 /// `from` displaced by a sum of kWaves smooth waves with random directions, wavelengths and phases, which depend on `number`
-/// only. Held vertices stay at their targets, and the surface around them follows.
+/// only, as does the vertex around which they are where they are not everywhere. Held vertices stay at their targets, and the
+/// surface around them follows.
 Points Deformer::Impl::displaced(const Points& from, int number) const {
   std::mt19937_64 bits(static_cast<std::uint64_t>(number) + 101);
   const auto uniform = [&bits] { return static_cast<double>(bits() >> 11) * 0x1p-53; };
@@ -88,8 +89,11 @@ Points Deformer::Impl::displaced(const Points& from, int number) const {
     const double x = uniform() - 0.5, y = uniform() - 0.5, z = uniform() - 0.5;
     return {x, y, z};
   };
+  const Points& rest = shape->scaled_positions();
   const double diagonal = shape->diagonal() / unit();
-  const double share = kOrigins[static_cast<std::size_t>(number) % kOrigins.size()].share;
+  const Origin& origin = kOrigins[static_cast<std::size_t>(number) % kOrigins.size()];
+  const auto centre = static_cast<Eigen::Index>(uniform() * static_cast<double>(rest.rows()));
+  const double radius = origin.radius * diagonal;
   struct Wave {
     Eigen::Vector3d frequency;
     double phase;
@@ -99,16 +103,16 @@ Points Deformer::Impl::displaced(const Points& from, int number) const {
   for (Wave& wave : waves) {
     wave.frequency = 4 * std::numbers::pi * kMostWaves / diagonal * centred();
     wave.phase = 2 * std::numbers::pi * uniform();
-    wave.amplitude = share * diagonal * centred().transpose();
+    wave.amplitude = origin.share * diagonal * centred().transpose();
   }
   Points x = from;
   workers().for_chunks(
       static_cast<std::size_t>(x.rows()), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
         for (auto i = static_cast<Eigen::Index>(begin); i < static_cast<Eigen::Index>(end); ++i) {
-          for (const Wave& wave : waves) {
-            const double angle = shape->scaled_positions().row(i).dot(wave.frequency) + wave.phase;
-            x.row(i) += std::cos(angle) * wave.amplitude;
-          }
+          const double far2 = (rest.row(i) - rest.row(centre)).squaredNorm();
+          const double share = radius > 0 ? std::exp(-far2 / (2 * radius * radius)) : 1;
+          for (const Wave& wave : waves)
+            x.row(i) += share * std::cos(rest.row(i).dot(wave.frequency) + wave.phase) * wave.amplitude;
         }
       });
   Points back = Points::Zero(x.rows(), 3);
@@ -125,13 +129,13 @@ Points Deformer::Impl::displaced(const Points& from, int number) const {
 }
 
 std::unique_ptr<Minimiser> Deformer::Impl::make_start(int number, const Points& guess, const Points& lowest) {
-  const Origin origin = kOrigins[static_cast<std::size_t>(number) % kOrigins.size()];
+  const bool is_from_lowest = kOrigins[static_cast<std::size_t>(number) % kOrigins.size()].is_lowest;
   const int first = is_by_coarse_levels(0) ? 1 : 0;
   const bool goes_by_two = number == first && !material.has_uniform_p();
   forget_weights();
   const bool is_factored = prepare_metric(true);  // of equal weights, which displaced() reads, too
   Points x = lowest;
-  if (is_factored) x = goes_by_two ? guess : displaced(origin.is_lowest ? lowest : guess, number);
+  if (is_factored) x = goes_by_two ? guess : displaced(is_from_lowest ? lowest : guess, number);
   if (!x.allFinite()) x = lowest;
   objective.evaluate(x, *norm);
   Problem problem = make_problem();

@@ -58,7 +58,7 @@ class LiveSolver {
   static constexpr std::chrono::milliseconds kSearchQuiet{1000};
   /// Starts for the same inputs, unless the effort asks for more. With 32 all problems of tests/bench/README.md, "Minima", end in
   /// the lowest minimum known.
-  static constexpr int kMostStarts = 64;
+  static constexpr int kMostStarts = 72;
 
   /// How a slice is run.
   struct Pace {

@@ -141,7 +141,7 @@ def test_a_solve_says_which_minima_it_has_seen(place: Place) -> None:
         result = session.solve()
         assert result.further_starts == 8
         assert result.energy == min(result.minima)
-        starts = f"looked for lower minima from 8 further starts, of which {len(result.minima) - 1} converged; minima of "
+        starts = f"looked for lower minima from 12 further starts, of which {len(result.minima) - 1} converged; minima of "
         assert result.searched.startswith(starts)
     with bend(place, effort=0) as session:
         result = session.solve(certify=True)

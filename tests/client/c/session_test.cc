@@ -189,7 +189,7 @@ TEST_F(CSessionTest, ASolveTellsWhatItHasSearchedAsFarAsThereIsRoom) {
   options.search = &search;
   ASSERT_EQ(lpdeform_solve(session_, &options, &buffers, &frame_, &error_), LPDEFORM_OK) << error_.message;
   EXPECT_EQ(search.effort, 1);
-  EXPECT_EQ(search.further_starts, 8);
+  EXPECT_EQ(search.further_starts, 12);
   EXPECT_GT(search.search_iterations, 0);
   EXPECT_LT(search.search_iterations, frame_.iteration);
   ASSERT_GE(search.minima_count, 1);

@@ -114,7 +114,7 @@ TEST_F(BentBarTest, ASessionInWhichNothingChangesAnnouncesABetterShapeWhichIsTak
 TEST_F(BentBarTest, ASolveSaysWhichMinimaItHasSeen) {
   Session session = open_bent({.effort = 1});
   const SolveResult lowest = session.solve().value();
-  EXPECT_EQ(lowest.further_starts, 8u);
+  EXPECT_EQ(lowest.further_starts, 12u);
   EXPECT_EQ(lowest.energy, std::ranges::min(lowest.minima));
   EXPECT_EQ(fault_of(session.take_better_shape().status()).reason, "NO_BETTER_SHAPE");
 }

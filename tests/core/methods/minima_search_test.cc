@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "core/base/fault.h"
 #include "tests/core/poses.h"
@@ -77,7 +78,7 @@ TEST_F(MinimaSearchTest, TheDefaultEndsInALowerMinimum) {
     const SolveSummary first = solve(bent, cold(0)), lowest = solve(bent, cold());
     EXPECT_LE(lowest.energy, first.energy);
     EXPECT_EQ(lowest.stop_reason, StopReason::kConverged);
-    EXPECT_EQ(lowest.further_starts, 8);
+    EXPECT_EQ(lowest.further_starts, 12);
     EXPECT_EQ(lowest.minima.front(), first.energy);
     EXPECT_EQ(lowest.energy, std::ranges::min(lowest.minima));
   }
@@ -174,10 +175,10 @@ TEST_F(MinimaSearchTest, ASecondSearchGoesOnWithOtherStarts) {
   ASSERT_TRUE(solver->start_search(1).ok());
   run(*solver);
   const std::vector<double> after_one = solver->summary().minima;
-  EXPECT_EQ(solver->summary().further_starts, 8);
+  EXPECT_EQ(solver->summary().further_starts, 12);
   ASSERT_TRUE(solver->start_search(1).ok());
   run(*solver);
-  EXPECT_EQ(solver->summary().further_starts, 16);
+  EXPECT_EQ(solver->summary().further_starts, 24);
   EXPECT_GE(solver->summary().minima.size(), after_one.size());
 }
 
@@ -229,31 +230,55 @@ TEST_F(MinimaSearchTest, NewInputsForgetWhatWasFound) {
   EXPECT_EQ(fault_of(solver->start_search(1)).reason, "NOT_SOLVED");
 }
 
-/// A minimiser that ends at once. Counts those that are there.
+/// A minimiser that ends at once, with the true sum 1. Counts those that are there.
 class Instant : public Minimiser {
  public:
-  explicit Instant(int& alive) : alive_(alive) { ++alive_; }
+  Instant(int& alive, Points x) : alive_(alive), x_(std::move(x)) { ++alive_; }
   ~Instant() override { --alive_; }
   StepResult step() override { return {Outcome::kConverged, 1, 0, 1}; }
   const Points& x() const override { return x_; }
 
  private:
   int& alive_;
-  const Points x_ = Points::Zero(1, 3);
+  const Points x_;
 };
 
-TEST_F(MinimaSearchTest, ThereIsOneMinimiserAtATime) {
-  int alive = 0, made = 0;
-  const auto make = [&] {
-    EXPECT_EQ(alive, 0);
-    ++made;
-    return std::make_unique<Instant>(alive);
-  };
-  MinimaSearch search([&](int, const Points&) { return make(); }, [&](Points) { return make(); },
-                      {.starts = 3, .most_iterations = 10}, Points::Zero(1, 3), 1);
-  while (search.step()) {
+/// A search of three starts that end at once in `ends`, from a minimum at a line of three vertices.
+struct ThreeStarts {
+  static Points line(double bend) { return Points{{0, 0, 0}, {1, bend, 0}, {2, 0, 0}}; }
+
+  ThreeStarts(double first_sum, const Points& ends)
+      : search([this, ends](int, const Points&) { return make(ends); },
+               [this](Points x) { return make(std::move(x)); }, {.starts = 3, .most_iterations = 10}, line(0),
+               first_sum) {
+    while (search.step()) {
+    }
   }
-  EXPECT_EQ(made, 6);  // a rough one and a finishing one of each start
+  std::unique_ptr<Minimiser> make(Points x) {
+    EXPECT_EQ(alive, 0);  // two of them would take twice the memory
+    ++made;
+    return std::make_unique<Instant>(alive, std::move(x));
+  }
+
+  int alive = 0, made = 0;
+  MinimaSearch search;
+};
+
+TEST_F(MinimaSearchTest, AStartThatComesBackToTheLowestMinimumIsNotMinimisedFurther) {
+  const ThreeStarts same(1.00005, ThreeStarts::line(1e-3));
+  EXPECT_EQ(same.made, 3);
+  EXPECT_THAT(same.search.minima(), testing::ElementsAre(1.00005, 1.00005, 1.00005));
+  EXPECT_FALSE(same.search.has_improved());
+  const ThreeStarts lower(1.001, ThreeStarts::line(1e-3));
+  EXPECT_EQ(lower.made, 4);  // a rough one and a finishing one; the others come back to where that has ended
+  EXPECT_THAT(lower.search.minima(), testing::ElementsAre(1, 1, 1));
+  EXPECT_EQ(lower.search.lowest_sum(), 1);
+}
+
+TEST_F(MinimaSearchTest, AnotherShapeOfTheSameEnergyIsMinimisedFurther) {
+  const ThreeStarts other(1, ThreeStarts::line(0.5));
+  EXPECT_EQ(other.made, 6);
+  EXPECT_THAT(other.search.minima(), testing::ElementsAre(1, 1, 1));
 }
 
 TEST_F(MinimaSearchTest, AMoveAfterASearchThatFoundNothingIsAsWithoutOne) {

@@ -218,7 +218,7 @@ TEST_F(LiveSearchTest, TheSearchOfASolveCallIsGoneOnWith) {
   const auto solve = job();
   settle(solve.get());
   ASSERT_TRUE(result_ && result_->ok());
-  ASSERT_EQ((*result_)->summary.further_starts, 8);
+  ASSERT_EQ((*result_)->summary.further_starts, 12);
   EXPECT_EQ(wait_for_search(), 2);
 }
 
@@ -236,7 +236,7 @@ TEST_F(LiveSearchTest, TheSearchOfASolveCallSendsNoFrames) {
     ASSERT_TRUE(stream->acknowledge(stream->last_frame_seq()).ok());
   }
   ASSERT_TRUE(result_ && result_->ok());
-  EXPECT_EQ((*result_)->summary.further_starts, 8);
+  EXPECT_EQ((*result_)->summary.further_starts, 12);
   // While it searches, the state is the first minimum. It is shown once, or a second time if the last iterations did not lower it.
   EXPECT_LE(std::ranges::count(energies, (*result_)->summary.minima.front()), 2);
 }

@@ -176,7 +176,7 @@ class MinimaSearch:
     where p is below 2."""
 
     effort: int | None = None
-    """The number of further starts is 8 times the effort, 0 to 1000. 0 takes the first minimum. None takes 1 if the method is
+    """The number of further starts is 12 times the effort, 0 to 1000. 0 takes the first minimum. None takes 1 if the method is
     "auto" and p is below 2 somewhere, and for solve() if it also starts cold, which is not from an earlier result; otherwise 0.
     A start takes up to two or three times as long as the first minimum. Meshes of fewer than 100 vertices are not searched.
     Meshes of more than 15,000 vertices are searched on their coarse levels, and only what is lower there is tried on the mesh

@@ -113,7 +113,7 @@ export interface SolverSettings {
  */
 export interface MinimaSearch {
   /**
-   * The number of further starts is 8 times the effort, 0 to 1000. 0 takes the first minimum. Default: 1 if the method is "auto"
+   * The number of further starts is 12 times the effort, 0 to 1000. 0 takes the first minimum. Default: 1 if the method is "auto"
    * and p is below 2 somewhere, and for Session.solve() if it also starts cold; otherwise 0. A start takes up to two or three
    * times as long as the first minimum. Meshes of fewer than 100 vertices are not searched. Meshes of more than 15,000 vertices
    * are searched on their coarse levels, and only what is lower there is tried on the mesh itself, as one further start.

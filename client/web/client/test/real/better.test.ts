@@ -64,7 +64,7 @@ test("a better shape is shown at once if that is asked for", async () => {
 test("a solve says which minima it has seen", async () => {
   const session = await bent({ effort: 1 });
   const result = await session.solve({ deadlineMs: 20_000 });
-  expect(result.furtherStarts).toBe(8);
+  expect(result.furtherStarts).toBe(12);
   expect(result.energy).toBe(Math.min(...result.minima));
   await session.close();
 });
