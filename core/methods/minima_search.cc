@@ -1,6 +1,5 @@
 #include "core/methods/minima_search.h"
 
-#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -9,9 +8,9 @@ namespace {
 
 constexpr double kComesNearer = 0.03;     // the least share of the difference to the lowest sum
 constexpr double kWorthFinishing = 1.02;  // a rough minimum's sum over the lowest, at most
-// A rough minimum is the lowest one if their sums differ by at most this share, and their root mean square distance is at most kNear
-// of the shape's size.
-constexpr double kSameSum = 1e-4, kNear = 1e-2;
+// A rough minimum is the lowest one again if its sum is above the lowest by at most this share, and no vertex is farther from where it is
+// there than kNear of the shape's size, the root mean square distance of vertices from their mean.
+constexpr double kSameSum = 1e-4, kNear = 0.03;
 
 }  // namespace
 
@@ -39,9 +38,9 @@ bool MinimaSearch::is_hopeless() const {
 
 /// Whether the rough minimum x with this true sum is the lowest one again.
 bool MinimaSearch::is_lowest_again(const Points& x, double sum) const {
-  if (!(std::abs(sum - lowest_sum_) <= kSameSum * lowest_sum_)) return false;
-  const double size2 = (lowest_.rowwise() - lowest_.colwise().mean()).squaredNorm();
-  return (x - lowest_).squaredNorm() <= kNear * kNear * size2;
+  if (!(sum >= lowest_sum_ && sum - lowest_sum_ <= kSameSum * lowest_sum_)) return false;
+  const double size2 = (lowest_.rowwise() - lowest_.colwise().mean()).rowwise().squaredNorm().mean();
+  return (x - lowest_).rowwise().squaredNorm().maxCoeff() <= kNear * kNear * size2;
 }
 
 void MinimaSearch::end_start(Outcome outcome) {

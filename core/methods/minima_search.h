@@ -11,7 +11,7 @@ namespace lpdeform {
 
 /// Looks for minima lower than a given one by basin hopping (Wales and Doye 1997): minimises from other starts, one after
 /// the other, and keeps the lowest state at which a start has ended. A start is first minimised roughly. Only if it then is the
-/// lowest, or nearly so, and not the known lowest one again, it is minimised to the tolerance. One caller at a time.
+/// lowest, or nearly so, it is minimised to the tolerance; not so if it has come back to the lowest state. One caller at a time.
 ///
 /// A start is abandoned after `most_iterations`, or if in 60 iterations its true sum has approached the lowest one by less
 /// than 3 % of the remaining difference. Iterations in which its true sum does not change, as while a coarse level runs, do

@@ -79,9 +79,9 @@ int Deformer::Impl::further_starts() const {
   return *settings.effort == 0 || !is_large() ? kStartsOfEffort * *settings.effort : 1;
 }
 
-/// `from` displaced by a sum of kWaves smooth waves with random directions, wavelengths and phases, which depend on `number`
-/// only, as does the vertex around which they are where they are not everywhere. Held vertices stay at their targets, and the
-/// surface around them follows.
+/// `from` displaced by a sum of kWaves smooth waves with random directions, wavelengths and phases, everywhere or around a random
+/// vertex that is free. All that is random depends on `number` only. Held vertices stay at their targets, and the surface around
+/// them follows.
 Points Deformer::Impl::displaced(const Points& from, int number) const {
   std::mt19937_64 bits(static_cast<std::uint64_t>(number) + 101);
   const auto uniform = [&bits] { return static_cast<double>(bits() >> 11) * 0x1p-53; };
@@ -92,7 +92,11 @@ Points Deformer::Impl::displaced(const Points& from, int number) const {
   const Points& rest = shape->scaled_positions();
   const double diagonal = shape->diagonal() / unit();
   const Origin& origin = kOrigins[static_cast<std::size_t>(number) % kOrigins.size()];
-  const auto centre = static_cast<Eigen::Index>(uniform() * static_cast<double>(rest.rows()));
+  const auto any_vertex = [&] {
+    return static_cast<Eigen::Index>(uniform() * static_cast<double>(rest.rows()));
+  };
+  Eigen::Index centre = any_vertex();
+  for (Eigen::Index k = 0; k < rest.rows() && constraints->is_held[centre]; ++k) centre = any_vertex();
   const double radius = origin.radius * diagonal;
   struct Wave {
     Eigen::Vector3d frequency;

@@ -56,8 +56,7 @@ class LiveSolver {
   static constexpr std::chrono::milliseconds kQuiet{100};
   static constexpr double kCertificateSeconds = 10;
   static constexpr std::chrono::milliseconds kSearchQuiet{1000};
-  /// Starts for the same inputs, unless the effort asks for more. With 32 all problems of tests/bench/README.md, "Minima", end in
-  /// the lowest minimum known.
+  /// Starts for the same inputs, unless the effort asks for more.
   static constexpr int kMostStarts = 72;
 
   /// How a slice is run.

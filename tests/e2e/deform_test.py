@@ -94,7 +94,7 @@ class Deform(OnShapes):
         first = self.deform("--p", 1.5, "--effort", 0)
         self.assertEqual((first["effort"], first["further_starts"], first["search_iterations"]), (0, 0, 0))
         self.assertEqual(first["minima"], [first["energy"]])
-        for effort, starts in ((None, 8), (2, 16)):
+        for effort, starts in ((None, 12), (2, 24)):
             report = self.deform("--p", 1.5, *(("--effort", effort) if effort else ()))
             self.assertEqual((report["effort"], report["further_starts"]), (effort or 1, starts))
             self.assertEqual(report["minima"][0], first["energy"])

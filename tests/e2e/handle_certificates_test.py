@@ -38,11 +38,11 @@ def moved(point):
 class Program:
     """min x.P.x / 2 + q.x over b - A x in cones, x the moves of free vertices from where they are and then the E_i.
 
-    Lengths are in units of the root mean E_i^p, so that clarabel's numbers are near 1.
+    Lengths are in units of the p-th root of the mean E_i^p, so that clarabel's numbers are near 1.
     """
 
     def __init__(self, free, extra):
-        self.free, self.column = free, {v: 3 * k for k, v in enumerate(free)}
+        self.column = {v: 3 * k for k, v in enumerate(free)}
         self.size, self.moves = 3 * len(free) + extra, 3 * len(free)
         self.entries, self.bounds, self.cones = [], [], []
         self.squares, self.constants = [], []
@@ -80,6 +80,7 @@ class Program:
         solution = clarabel.DefaultSolver(sparse.triu(2 * factor.T @ factor).tocsc(), linear + 2 * factor.T @ constants,
                                           self.matrix(self.entries, (len(self.bounds), self.size)), np.array(self.bounds),
                                           self.cones, settings).solve()
+        assert solution.r_dual < 1e-9, solution.r_dual  # else its objective is no bound
         return np.reshape(solution.x[:self.moves], (-1, 3)), solution.obj_val_dual + constants @ constants
 
 

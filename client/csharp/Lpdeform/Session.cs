@@ -301,7 +301,7 @@ namespace Lpdeform
             return frame;
         }
 
-        const int MostMinima = 1 + 8 * 1000;  // with the largest effort
+        const int MostMinima = 1 + 12 * 1000;  // with the largest effort
 
         enum Asked { New, Last, Result, Solve, CertifiedSolve }
 

@@ -85,7 +85,7 @@ namespace Lpdeform
     /// How far to look for lower minima once the first one is found: below p = 2 the energy has many.
     public struct MinimaSearch
     {
-        /// The number of further starts is 8 times the effort, 0 to 1000. 0 takes the first minimum. null: 1 if Method is Auto and
+        /// The number of further starts is 12 times the effort, 0 to 1000. 0 takes the first minimum. null: 1 if Method is Auto and
         /// p is below 2 somewhere, and for Solve if it also starts cold; otherwise 0. A start takes up to two or three times as long
         /// as the first minimum. Meshes of fewer than 100 vertices are not searched. Meshes of more than 15,000 vertices are
         /// searched on their coarse levels, and only what is lower there is tried on the mesh itself, as one further start.

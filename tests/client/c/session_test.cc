@@ -179,7 +179,7 @@ TEST_F(CSessionTest, ASolveTellsWhatItHasSearchedAsFarAsThereIsRoom) {
   ASSERT_EQ(lpdeform_set(session_, &settings, nullptr, &error_), LPDEFORM_OK) << error_.message;
   std::vector<Point> points(121);
   const lpdeform_buffers buffers = buffers_of(points);
-  std::array<double, 9> minima{};
+  std::array<double, 13> minima{};
   lpdeform_search search{};
   search.struct_size = sizeof search;
   search.minima = minima.data();
