@@ -8,9 +8,9 @@ namespace {
 
 constexpr double kComesNearer = 0.03;     // the least share of the difference to the lowest sum
 constexpr double kWorthFinishing = 1.02;  // a rough minimum's sum over the lowest, at most
-// A rough minimum is the lowest one again if its sum is above the lowest by at most this share, and no vertex is farther from where it is
-// there than kNear of the shape's size, the root mean square distance of vertices from their mean.
-constexpr double kSameSum = 1e-4, kNear = 0.03;
+// A rough minimum is the lowest one again if its sum is above the lowest by at most this share, and no vertex is farther from its place
+// there than a mean edge length, the scaled unit.
+constexpr double kSameSum = 1e-4, kNear = 1;
 
 }  // namespace
 
@@ -39,8 +39,7 @@ bool MinimaSearch::is_hopeless() const {
 /// Whether the rough minimum x with this true sum is the lowest one again.
 bool MinimaSearch::is_lowest_again(const Points& x, double sum) const {
   if (!(sum >= lowest_sum_ && sum - lowest_sum_ <= kSameSum * lowest_sum_)) return false;
-  const double size2 = (lowest_.rowwise() - lowest_.colwise().mean()).rowwise().squaredNorm().mean();
-  return (x - lowest_).rowwise().squaredNorm().maxCoeff() <= kNear * kNear * size2;
+  return (x - lowest_).rowwise().squaredNorm().maxCoeff() <= kNear * kNear;
 }
 
 void MinimaSearch::end_start(Outcome outcome) {

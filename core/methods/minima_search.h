@@ -11,7 +11,7 @@ namespace lpdeform {
 
 /// Looks for minima lower than a given one by basin hopping (Wales and Doye 1997): minimises from other starts, one after
 /// the other, and keeps the lowest state at which a start has ended. A start is first minimised roughly. Only if it then is the
-/// lowest, or nearly so, it is minimised to the tolerance; not so if it has come back to the lowest state. One caller at a time.
+/// lowest, or nearly so, it is minimised to the tolerance, unless it has come back to the lowest state. One caller at a time.
 ///
 /// A start is abandoned after `most_iterations`, or if in 60 iterations its true sum has approached the lowest one by less
 /// than 3 % of the remaining difference. Iterations in which its true sum does not change, as while a coarse level runs, do
@@ -38,7 +38,8 @@ class MinimaSearch {
   double lowest_sum() const { return lowest_sum_; }
   /// Whether lowest() is another state than the one to begin with.
   bool has_improved() const { return has_improved_; }
-  /// The true sums of the starts that have ended in a minimum, in order. Several may be of the same minimum.
+  /// The true sums of the starts that have ended in a minimum, in order. Several may be of the same minimum. One that came back to the
+  /// lowest has its sum.
   const std::vector<double>& minima() const { return minima_; }
   /// Starts that have ended, with those that were given up.
   int starts() const { return number_ - scope_.first; }

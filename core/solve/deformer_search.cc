@@ -2,12 +2,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
-#include <random>
 #include <utility>
 
 #include "core/multiresolution/multiresolution.h"
 #include "core/solve/deformer_impl.h"
+#include "core/solve/random_waves.h"
 
 namespace lpdeform {
 namespace {
@@ -16,18 +15,21 @@ constexpr int kEffortOfLevel = 2;            // times the effort: starts of a co
 constexpr std::int32_t kSmallestMesh = 100;  // vertices; smaller ones have few minima
 constexpr double kWork = 2e7;                // iterations times vertices of a start, at most
 
-/// Start k begins at the Laplacian deformation or at the lowest minimum, displaced by a share of the diagonal: at kOrigins[k mod
-/// 3]. Where `radius` is not 0, only the surroundings of one vertex are displaced, by a Gaussian of this share of the diagonal. No
-/// single one of them reaches the lowest minimum of every problem (tests/bench/tried.md, "Minima").
+/// Start k begins at the Laplacian deformation or at the lowest minimum, displaced by waves: at kOrigins[k mod 3]. No single one of
+/// them reaches the lowest minimum of every problem (tests/bench/tried.md, "Minima").
 struct Origin {
   bool is_lowest;
-  double share, radius;
+  RandomWaves::Size waves;
 };
-constexpr std::array kOrigins = {Origin{true, 0.2, 0.15}, Origin{true, 0.2, 0}, Origin{false, 0.12, 0}};
+constexpr std::array kOrigins = {Origin{true, {.share = 0.2, .radius = 0.15}},
+                                 Origin{true, {.share = 0.2, .radius = 0}},
+                                 Origin{false, {.share = 0.12, .radius = 0}}};
+
+const Origin& origin_of(int number) {
+  return kOrigins[static_cast<std::size_t>(number) % kOrigins.size()];
+}
 
 constexpr double kRoughTolerance = 1e-3;
-constexpr int kWaves = 6;
-constexpr double kMostWaves = 2;      // along the diagonal, for each axis
 constexpr std::size_t kChunk = 4096;  // vertices
 
 /// Minimises with p = 2 everywhere first, and from there with the true norm. Where p is mixed, this leads to other minima than
@@ -79,45 +81,17 @@ int Deformer::Impl::further_starts() const {
   return *settings.effort == 0 || !is_large() ? kStartsOfEffort * *settings.effort : 1;
 }
 
-/// `from` displaced by a sum of kWaves smooth waves with random directions, wavelengths and phases, everywhere or around a random
-/// vertex that is free. All that is random depends on `number` only. Held vertices stay at their targets, and the surface around
-/// them follows.
+/// `from` displaced by random waves, which depend on `number`. Held vertices stay at their targets, and the surface around them
+/// follows.
 Points Deformer::Impl::displaced(const Points& from, int number) const {
-  std::mt19937_64 bits(static_cast<std::uint64_t>(number) + 101);
-  const auto uniform = [&bits] { return static_cast<double>(bits() >> 11) * 0x1p-53; };
-  const auto centred = [&uniform]() -> Eigen::Vector3d {
-    const double x = uniform() - 0.5, y = uniform() - 0.5, z = uniform() - 0.5;
-    return {x, y, z};
-  };
   const Points& rest = shape->scaled_positions();
-  const double diagonal = shape->diagonal() / unit();
-  const Origin& origin = kOrigins[static_cast<std::size_t>(number) % kOrigins.size()];
-  const auto any_vertex = [&] {
-    return static_cast<Eigen::Index>(uniform() * static_cast<double>(rest.rows()));
-  };
-  Eigen::Index centre = any_vertex();
-  for (Eigen::Index k = 0; k < rest.rows() && constraints->is_held[centre]; ++k) centre = any_vertex();
-  const double radius = origin.radius * diagonal;
-  struct Wave {
-    Eigen::Vector3d frequency;
-    double phase;
-    Eigen::RowVector3d amplitude;
-  };
-  std::array<Wave, kWaves> waves;
-  for (Wave& wave : waves) {
-    wave.frequency = 4 * std::numbers::pi * kMostWaves / diagonal * centred();
-    wave.phase = 2 * std::numbers::pi * uniform();
-    wave.amplitude = origin.share * diagonal * centred().transpose();
-  }
+  const RandomWaves waves(number, rest, shape->diagonal() / unit(), origin_of(number).waves,
+                          constraints->is_held);
   Points x = from;
   workers().for_chunks(
       static_cast<std::size_t>(x.rows()), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
-        for (auto i = static_cast<Eigen::Index>(begin); i < static_cast<Eigen::Index>(end); ++i) {
-          const double far2 = (rest.row(i) - rest.row(centre)).squaredNorm();
-          const double share = radius > 0 ? std::exp(-far2 / (2 * radius * radius)) : 1;
-          for (const Wave& wave : waves)
-            x.row(i) += share * std::cos(rest.row(i).dot(wave.frequency) + wave.phase) * wave.amplitude;
-        }
+        for (auto i = static_cast<Eigen::Index>(begin); i < static_cast<Eigen::Index>(end); ++i)
+          x.row(i) += waves.at(rest.row(i));
       });
   Points back = Points::Zero(x.rows(), 3);
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
@@ -133,13 +107,12 @@ Points Deformer::Impl::displaced(const Points& from, int number) const {
 }
 
 std::unique_ptr<Minimiser> Deformer::Impl::make_start(int number, const Points& guess, const Points& lowest) {
-  const bool is_from_lowest = kOrigins[static_cast<std::size_t>(number) % kOrigins.size()].is_lowest;
   const int first = is_by_coarse_levels(0) ? 1 : 0;
   const bool goes_by_two = number == first && !material.has_uniform_p();
   forget_weights();
   const bool is_factored = prepare_metric(true);  // of equal weights, which displaced() reads, too
   Points x = lowest;
-  if (is_factored) x = goes_by_two ? guess : displaced(is_from_lowest ? lowest : guess, number);
+  if (is_factored) x = goes_by_two ? guess : displaced(origin_of(number).is_lowest ? lowest : guess, number);
   if (!x.allFinite()) x = lowest;
   objective.evaluate(x, *norm);
   Problem problem = make_problem();

@@ -265,27 +265,27 @@ struct ThreeStarts {
 };
 
 TEST_F(MinimaSearchTest, AStartThatComesBackToTheLowestMinimumIsNotMinimisedFurther) {
-  const ThreeStarts same(0.99995, ThreeStarts::line(0.02));
+  const ThreeStarts same(0.99995, ThreeStarts::line(0.9));
   EXPECT_EQ(same.made, 3);
   EXPECT_THAT(same.search.minima(), testing::ElementsAre(0.99995, 0.99995, 0.99995));
   EXPECT_FALSE(same.search.has_improved());
 }
 
 TEST_F(MinimaSearchTest, AStartThatIsLowerIsMinimisedFurtherHoweverNearItIs) {
-  const ThreeStarts lower(1.00005, ThreeStarts::line(0.02));
+  const ThreeStarts lower(1.00005, ThreeStarts::line(0.9));
   EXPECT_EQ(lower.made, 4);  // a rough one and a finishing one; the others come back to where that has ended
   EXPECT_THAT(lower.search.minima(), testing::ElementsAre(1, 1, 1));
   EXPECT_EQ(lower.search.lowest_sum(), 1);
 }
 
 TEST_F(MinimaSearchTest, AnotherShapeOfTheSameEnergyIsMinimisedFurther) {
-  const ThreeStarts other(1, ThreeStarts::line(0.04));
+  const ThreeStarts other(1, ThreeStarts::line(1.1));
   EXPECT_EQ(other.made, 6);
   EXPECT_THAT(other.search.minima(), testing::ElementsAre(1, 1, 1));
 }
 
 TEST_F(MinimaSearchTest, AHigherEnergyIsMinimisedFurtherHoweverNearTheShapeIs) {
-  const ThreeStarts higher(0.9998, ThreeStarts::line(0.02));
+  const ThreeStarts higher(0.9998, ThreeStarts::line(0.9));
   EXPECT_EQ(higher.made, 6);
   EXPECT_THAT(higher.search.minima(), testing::ElementsAre(1, 1, 1));
 }
