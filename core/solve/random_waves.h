@@ -14,12 +14,10 @@ class RandomWaves {
  public:
   struct Size {
     double share;  // of the diagonal: each coordinate of a wave's amplitude is at most half of it
-    double
-        radius;  // over the diagonal, of the Gaussian around a random vertex that is free; 0: the waves are everywhere
+    double radius;  // of the diagonal: the Gaussian's around a random free vertex; 0: the waves are everywhere
   };
 
-  /// What is random depends on `number`, and the Gaussian's vertex also on which vertices are held. `rest` in scaled units, with at least
-  /// one vertex.
+  /// What is random depends on `number` and on which vertices are held. `rest` in scaled units, with at least one vertex.
   RandomWaves(int number, const Points& rest, double diagonal, const Size& size,
               const std::vector<char>& is_held);
 
