@@ -13,8 +13,8 @@ namespace lpdeform {
 class RandomWaves {
  public:
   struct Size {
-    double share;  // of the diagonal: each coordinate of a wave's amplitude is at most half of it
-    double radius;  // of the diagonal: the Gaussian's around a random free vertex; 0: the waves are everywhere
+    double share;   // of the diagonal: each coordinate of a wave's amplitude is at most half of it
+    double radius;  // of the diagonal: of the Gaussian around a free vertex; 0: everywhere
   };
 
   /// What is random depends on `number` and on which vertices are held. `rest` in scaled units, with at least one vertex.
