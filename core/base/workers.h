@@ -8,7 +8,8 @@ namespace lpdeform {
 
 /// A share of the process-wide oneTBB thread pool. Work is cut into fixed chunks that depend only on its size, never on
 /// the number of threads. A caller that adds up per-chunk results in chunk order therefore gets the same bits on any
-/// number of threads. Thread-safe; copies share the pool.
+/// number of threads. A loop inside a chunk of another loop shares the threads of that one. Thread-safe. It holds no threads
+/// while no loop runs, so a process may have thousands.
 class Workers {
  public:
   /// At most `threads` >= 1 threads are used, including the calling one; 1 runs everything inline.
@@ -26,9 +27,9 @@ class Workers {
   void run_both(const std::function<void()>& first, const std::function<void()>& second) const;
 
  private:
-  struct Arena;
+  struct MoreThanCores;
   int threads_;
-  std::shared_ptr<Arena> arena_;
+  std::shared_ptr<MoreThanCores> more_than_cores_;  // null if there are enough cores
 };
 
 /// The number of cores this process may use, at least 1.

@@ -70,7 +70,7 @@ absl::StatusOr<std::unique_ptr<Deformer>> Deformer::create(std::shared_ptr<const
   std::optional<absl::StatusOr<Metric>> metric;
   std::optional<Objective> objective;
   std::optional<CoarseMesh> coarse;
-  const Workers workers(shape->vertex_count() < options.parallel_from ? 1 : options.threads);
+  const Workers workers(std::clamp(shape->vertex_count() / options.vertices_a_thread, 1, options.threads));
   workers.run_both(
       [&] {
         metric = Metric::create(shape, admit);

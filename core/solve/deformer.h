@@ -21,9 +21,9 @@ namespace lpdeform {
 
 struct DeformerOptions {
   FreeComponents free_components = FreeComponents::kError;
-  int threads = 1;
-  /// Smaller meshes use only the calling thread, because more threads would make them slower.
-  std::int32_t parallel_from = 8000;  // vertices
+  int threads = 1;  // at most; see vertices_a_thread
+  /// A mesh has at most one thread for each so many vertices. More would take longer to wake than they save.
+  std::int32_t vertices_a_thread = 1000;
   /// Larger meshes look for lower minima on their coarse levels only.
   std::int32_t search_up_to = 15000;  // vertices
   /// The search of a solve keeps the first minimum unless another one saves at least this share of the energy.

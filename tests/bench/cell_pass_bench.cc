@@ -1,8 +1,12 @@
-// The parts of an iteration: the rotation fit compared with plain SVD, the cell pass on one and two threads, and the metric.
+// The parts of an iteration: the rotation fit compared with plain SVD, the cell pass on one and two threads, the metric, and loops
+// beside many sessions.
 
 #include <benchmark/benchmark.h>
 
+#include <chrono>
 #include <random>
+#include <thread>
+#include <vector>
 
 #include "core/constraints/metric.h"
 #include "core/energy/cell_pass.h"
@@ -104,6 +108,26 @@ BENCHMARK(metric_precondition)
     ->ArgsProduct({{63, 200, 316}, {1, 2}})
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
+
+/// A short loop on two threads while so many others exist that have run one, as sessions have, with a pause before it in which
+/// threads fall asleep.
+void loop_beside_others(benchmark::State& state) {
+  std::vector<Workers> others(static_cast<std::size_t>(state.range(0)), Workers(2));
+  std::vector<double> sums(8);
+  const auto run = [&](const Workers& workers) {
+    workers.for_chunks(8, 1, [&](std::size_t k, std::size_t, std::size_t) {
+      for (int i = 0; i < 20000; ++i) benchmark::DoNotOptimize(sums[k] += i);
+    });
+  };
+  for (Workers& other : others) run(other = Workers(2));
+  for (auto _ : state) {
+    state.PauseTiming();
+    std::this_thread::sleep_for(std::chrono::microseconds(300));
+    state.ResumeTiming();
+    run(others[others.size() / 2]);
+  }
+}
+BENCHMARK(loop_beside_others)->Arg(1)->Arg(1000)->Arg(5000)->UseRealTime()->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace lpdeform

@@ -43,7 +43,8 @@ Bent lifted_grid(double height) {
 class MinimaSearchTest : public testing::Test {
  protected:
   static std::unique_ptr<Deformer> solver_of(const Bent& bent, int threads = 1) {
-    auto result = Deformer::create(rest_shape(bent.mesh), {.threads = threads, .parallel_from = 1}).value();
+    auto result =
+        Deformer::create(rest_shape(bent.mesh), {.threads = threads, .vertices_a_thread = 1}).value();
     EXPECT_TRUE(result->set_handles(bent.handles).ok());
     EXPECT_TRUE(result->set_material(Material::uniform(1.5)).ok());
     return result;

@@ -213,7 +213,7 @@ TEST_F(GradedLevelTest, GivesTheSameBitsOnAnyNumberOfThreads) {
     std::vector<Points> results;
     for (const int threads : {1, 3}) {
       const auto deformer =
-          Deformer::create(shape, {.threads = threads, .parallel_from = 0, .graded_from = 1000}).value();
+          Deformer::create(shape, {.threads = threads, .vertices_a_thread = 1, .graded_from = 1000}).value();
       ASSERT_TRUE(deformer->set_handles(fold()).ok());
       ASSERT_TRUE(deformer->set_material(Material::uniform(p)).ok());
       (void)deformer->solve(settings());
@@ -223,7 +223,7 @@ TEST_F(GradedLevelTest, GivesTheSameBitsOnAnyNumberOfThreads) {
   }
   std::vector<Points> results;
   for (const int threads : {1, 3}) {
-    const auto late = late_solver(bend(), 1.5, {.threads = threads, .parallel_from = 0});
+    const auto late = late_solver(bend(), 1.5, {.threads = threads, .vertices_a_thread = 1});
     EXPECT_GT(waiting_records(late->solve(settings()).value()), 5);
     results.push_back(late->positions());
   }

@@ -250,8 +250,8 @@ TEST_F(MultiresolutionTest, MakesTheSolverOfALargeLevelAgainForTheNextColdSolve)
 }
 
 TEST_F(MultiresolutionTest, GivesTheSameBitsOnAnyNumberOfThreads) {
-  auto one = deformer(shape, bend(), Material::uniform(1.5), {.threads = 1, .parallel_from = 0});
-  auto two = deformer(shape, bend(), Material::uniform(1.5), {.threads = 2, .parallel_from = 0});
+  auto one = deformer(shape, bend(), Material::uniform(1.5), {.threads = 1, .vertices_a_thread = 1});
+  auto two = deformer(shape, bend(), Material::uniform(1.5), {.threads = 2, .vertices_a_thread = 1});
   (void)one->solve(settings(Method::kMultiresolution));
   (void)two->solve(settings(Method::kMultiresolution));
   EXPECT_EQ(one->positions(), two->positions());

@@ -84,8 +84,8 @@ TEST_P(HandleKinds, ConvergeOnAMonotoneTrace) {
 }
 
 TEST_P(HandleKinds, GiveTheSameBitsOnAnyNumberOfThreads) {
-  auto one = deformer(shape, handles(), Material::uniform(p()), {.threads = 1, .parallel_from = 0});
-  auto two = deformer(shape, handles(), Material::uniform(p()), {.threads = 2, .parallel_from = 0});
+  auto one = deformer(shape, handles(), Material::uniform(p()), {.threads = 1, .vertices_a_thread = 1});
+  auto two = deformer(shape, handles(), Material::uniform(p()), {.threads = 2, .vertices_a_thread = 1});
   ASSERT_TRUE(one->solve(cold()).ok());
   ASSERT_TRUE(two->solve(cold()).ok());
   EXPECT_EQ(one->positions(), two->positions());

@@ -124,10 +124,10 @@ TEST_P(EveryMethod, GivesTheSameBitsOnAnyNumberOfThreads) {
   (void)handles.set("top", {slice(mesh, 2, 30, 30), turn(Eigen::Vector3d::UnitZ(), 60, {2, 4, 0})});
   SolveSettings few = settings();
   few.max_iterations = 12;
-  auto one = make(mesh, handles, {.threads = 1, .parallel_from = 0});
+  auto one = make(mesh, handles, {.threads = 1, .vertices_a_thread = 1});
   ASSERT_TRUE(one->solve(few).ok());
   for (const int threads : {2, 4}) {
-    auto several = make(mesh, handles, {.threads = threads, .parallel_from = 0});
+    auto several = make(mesh, handles, {.threads = threads, .vertices_a_thread = 1});
     ASSERT_TRUE(several->solve(few).ok());
     EXPECT_EQ(several->positions(), one->positions()) << threads << " threads";
   }

@@ -1,0 +1,98 @@
+#include "core/base/workers.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <thread>
+#include <vector>
+
+namespace lpdeform {
+namespace {
+
+using Counts = std::vector<std::atomic<int>>;
+
+bool all_are(const Counts& counts, int expected) {
+  for (const std::atomic<int>& count : counts) {
+    if (count != expected) return false;
+  }
+  return true;
+}
+
+TEST(Workers, RunsEachChunkOnce) {
+  for (const int threads : {1, 2, 5}) {
+    std::array<std::array<std::size_t, 2>, 4> ranges{};
+    Workers(threads).for_chunks(10, 3, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+      ranges[chunk] = {begin, end};
+    });
+    const std::array<std::array<std::size_t, 2>, 4> expected{{{0, 3}, {3, 6}, {6, 9}, {9, 10}}};
+    EXPECT_EQ(ranges, expected) << threads;
+  }
+}
+
+TEST(Workers, RunsNothingForNothing) {
+  for (const int threads : {1, 2}) {
+    Workers(threads).for_chunks(
+        0, 3, [](std::size_t, std::size_t, std::size_t) { FAIL() << "a chunk of nothing"; });
+  }
+}
+
+// Both functions wait for the other one to have begun.
+TEST(Workers, RunsBothAtTheSameTime) {
+  std::atomic<int> begun = 0;
+  const auto meet = [&] {
+    for (++begun; begun < 2;) std::this_thread::yield();
+  };
+  Workers(2).run_both(meet, meet);
+  EXPECT_EQ(begun, 2);
+}
+
+TEST(Workers, RunsLoopsInsideLoops) {
+  const Workers outer(4), inner(4);
+  Counts counts(6 * 50);
+  outer.for_chunks(6, 1, [&](std::size_t chunk, std::size_t, std::size_t) {
+    inner.for_chunks(50, 1,
+                     [&](std::size_t, std::size_t begin, std::size_t) { ++counts[50 * chunk + begin]; });
+  });
+  EXPECT_TRUE(all_are(counts, 1));
+}
+
+// While a thread waits for an inner loop, it begins no other chunk of the outer one. Otherwise a chunk could have to wait for another one
+// to end.
+TEST(Workers, AChunkIsNotBegunInsideAnother) {
+  const Workers workers(4);
+  static thread_local int depth = 0;
+  std::atomic<int> deepest = 0;
+  for (int loop = 0; loop < 30; ++loop) {
+    workers.for_chunks(64, 1, [&](std::size_t, std::size_t, std::size_t) {
+      if (++depth > deepest) deepest = depth;
+      workers.for_chunks(4, 1, [](std::size_t k, std::size_t, std::size_t) {
+        std::this_thread::sleep_for(std::chrono::microseconds(50 * k));
+      });
+      --depth;
+    });
+  }
+  EXPECT_EQ(deepest, 1);
+}
+
+TEST(Workers, RunsLoopsOfSeveralThreads) {
+  constexpr int kLoops = 200;
+  Counts counts(100);
+  std::vector<std::thread> callers;
+  const Workers workers(3);
+  for (int caller = 0; caller < 4; ++caller) {
+    callers.emplace_back([&counts, &workers] {
+      for (int loop = 0; loop < kLoops; ++loop) {
+        workers.for_chunks(counts.size(), 7, [&](std::size_t, std::size_t begin, std::size_t end) {
+          for (; begin < end; ++begin) ++counts[begin];
+        });
+      }
+    });
+  }
+  for (std::thread& caller : callers) caller.join();
+  EXPECT_TRUE(all_are(counts, 4 * kLoops));
+}
+
+}  // namespace
+}  // namespace lpdeform
