@@ -4,10 +4,11 @@
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <cstdint>
-#include <map>
+#include <iterator>
 #include <mutex>
 #include <utility>
 #include <vector>
@@ -33,6 +34,20 @@ void happens_before(const void*) {}
 void happens_after(const void*) {}
 #endif
 
+/// Whether this thread runs a chunk.
+thread_local bool is_in_chunk = false;
+
+class InChunk {
+ public:
+  InChunk() : was_in_chunk_(std::exchange(is_in_chunk, true)) {}
+  ~InChunk() { is_in_chunk = was_in_chunk_; }
+  InChunk(const InChunk&) = delete;
+  InChunk& operator=(const InChunk&) = delete;
+
+ private:
+  const bool was_in_chunk_;
+};
+
 // A loop over chunks in the form that oneTBB calls. oneTBB orders the caller, the chunks and the code after the loop,
 // but ThreadSanitizer cannot see this because Debian's library is not built for it. So each step announces the order to
 // ThreadSanitizer before it reads any member. In other builds this does nothing.
@@ -42,13 +57,14 @@ class ChunkLoop {
 
   void operator()() const {
     happens_after(&called_);
-    tbb::parallel_for(std::size_t{0}, chunks_, *this);
+    tbb::parallel_for(std::size_t{0}, chunks_, *this, context_);
   }
   void operator()(std::size_t chunk) const {
     happens_after(&called_);
-    const bool was_in_loop = std::exchange(is_in_loop, true);
-    run_(chunk);
-    is_in_loop = was_in_loop;
+    {
+      const InChunk guard;
+      run_(chunk);
+    }
     happens_before(&done_);
   }
   void run_in(tbb::task_arena& arena) const {
@@ -62,21 +78,20 @@ class ChunkLoop {
     tbb::this_task_arena::isolate(*this);
     happens_after(&done_);
   }
-  static bool is_inside_loop() { return is_in_loop; }
 
  private:
-  static thread_local bool is_in_loop;
-
   const std::function<void(std::size_t)>& run_;
   const std::size_t chunks_;
+  /// Takes the caller's floating-point settings along. An arena keeps those of the thread that first used it.
+  mutable tbb::task_group_context context_{
+      tbb::task_group_context::isolated,
+      tbb::task_group_context::default_traits | tbb::task_group_context::fp_settings};
   std::uint64_t called_ = 0;  // only their addresses are used
   std::uint64_t done_ = 0;
 };
 
-thread_local bool ChunkLoop::is_in_loop = false;
-
 /// Arenas in which no loop runs at present. Each loop borrows one. Whenever an arena asks for threads, oneTBB looks at all others, so
-/// with an arena for each session a loop would take the longer the more sessions are open.
+/// loops would take the longer the more sessions are open if each session had its own.
 class IdleArenas {
  public:
   static IdleArenas& of_process() {
@@ -84,36 +99,44 @@ class IdleArenas {
     return *arenas;
   }
 
+  /// An arena that was used not long ago, because its threads may still be awake.
   std::unique_ptr<tbb::task_arena> take(int threads) {
-    const std::lock_guard lock(mutex_);
-    std::vector<std::unique_ptr<tbb::task_arena>>& idle = idle_[threads];
-    if (idle.empty()) return std::make_unique<tbb::task_arena>(threads);
-    std::unique_ptr<tbb::task_arena> arena = std::move(idle.back());  // its threads may still be awake
-    idle.pop_back();
-    return arena;
+    if (const std::unique_lock lock(mutex_, std::try_to_lock); lock.owns_lock()) {
+      const auto same = std::find_if(idle_.rbegin(), idle_.rend(),
+                                     [&](const auto& arena) { return arena->max_concurrency() == threads; });
+      if (same != idle_.rend()) {
+        std::unique_ptr<tbb::task_arena> arena = std::move(*same);
+        idle_.erase(std::next(same).base());
+        return arena;
+      }
+    }
+    return std::make_unique<tbb::task_arena>(threads);
   }
-  void put_back(int threads, std::unique_ptr<tbb::task_arena> arena) {
-    const std::lock_guard lock(mutex_);
-    idle_[threads].push_back(std::move(arena));
+
+  void put_back(std::unique_ptr<tbb::task_arena> arena) {
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (!lock.owns_lock()) return;
+    if (idle_.size() == most_) idle_.erase(idle_.begin());
+    idle_.push_back(std::move(arena));
   }
 
  private:
-  std::mutex mutex_;
-  std::map<int, std::vector<std::unique_ptr<tbb::task_arena>>> idle_;  // by number of threads
+  const std::size_t most_ = static_cast<std::size_t>(available_cores());
+  std::mutex mutex_;  // is never waited for: after a fork nobody might release it
+  std::vector<std::unique_ptr<tbb::task_arena>> idle_;
 };
 
 }  // namespace
 
-/// Without this, oneTBB never starts more threads than there are cores, however many an arena asks for.
+/// Without this, oneTBB never starts more threads than there are cores, however many an arena asks for. It obeys the lowest of all
+/// limits, so this one is the same for all.
 struct Workers::MoreThanCores {
-  explicit MoreThanCores(int threads)
-      : control(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads)) {}
-  tbb::global_control control;
+  tbb::global_control control{tbb::global_control::max_allowed_parallelism, 1024};
 };
 
 Workers::Workers(int threads) : threads_(threads) {
   LPDEFORM_CHECK(threads >= 1);
-  if (threads > available_cores()) more_than_cores_ = std::make_shared<MoreThanCores>(threads);
+  if (threads > available_cores()) more_than_cores_ = std::make_shared<MoreThanCores>();
 }
 
 void Workers::for_chunks(std::size_t count, std::size_t chunk_size,
@@ -128,10 +151,10 @@ void Workers::for_chunks(std::size_t count, std::size_t chunk_size,
   }
   const std::function<void(std::size_t)> run_chunk = run;
   const ChunkLoop loop(chunks, run_chunk);
-  if (ChunkLoop::is_inside_loop()) return loop.run_in_present_arena();
+  if (is_in_chunk) return loop.run_in_present_arena();
   std::unique_ptr<tbb::task_arena> arena = IdleArenas::of_process().take(threads_);
   loop.run_in(*arena);
-  IdleArenas::of_process().put_back(threads_, std::move(arena));
+  IdleArenas::of_process().put_back(std::move(arena));
 }
 
 void Workers::run_both(const std::function<void()>& first, const std::function<void()>& second) const {

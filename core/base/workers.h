@@ -12,18 +12,19 @@ namespace lpdeform {
 /// while no loop runs, so a process may have thousands.
 class Workers {
  public:
-  /// At most `threads` >= 1 threads are used, including the calling one; 1 runs everything inline.
+  /// At most `threads` >= 1 threads are used, including the calling one; 1 runs everything inline. Inside a chunk of another loop the
+  /// limit is that of the outermost loop.
   explicit Workers(int threads);
 
   int threads() const { return threads_; }
 
   /// Calls `body(chunk, begin, end)` once for each of the ceil(count / chunk_size) ranges of [0, count). Runs inline if
-  /// there is only one chunk. `body` must not throw.
+  /// there is only one chunk. If `body` throws, chunks may be left out, and this throws the same.
   void for_chunks(
       std::size_t count, std::size_t chunk_size,
       const std::function<void(std::size_t chunk, std::size_t begin, std::size_t end)>& body) const;
 
-  /// Calls both functions, at the same time where there are two threads. They must not throw.
+  /// Calls both functions, at the same time where there are two threads.
   void run_both(const std::function<void()>& first, const std::function<void()>& second) const;
 
  private:

@@ -22,7 +22,7 @@ namespace lpdeform {
 struct DeformerOptions {
   FreeComponents free_components = FreeComponents::kError;
   int threads = 1;  // at most; see vertices_a_thread
-  /// A mesh has at most one thread for each so many vertices. More would take longer to wake than they save.
+  /// A mesh has at most one thread for each so many vertices, which are at least 1. More threads would take longer to wake than they save.
   std::int32_t vertices_a_thread = 1000;
   /// Larger meshes look for lower minima on their coarse levels only.
   std::int32_t search_up_to = 15000;  // vertices

@@ -109,7 +109,7 @@ BENCHMARK(metric_precondition)
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 
-/// A short loop on two threads while so many others exist that have run one, as sessions have, with a pause before it in which
+/// A short loop on two threads. So many other Workers have run one before, as open sessions have. In the pause before each loop its
 /// threads fall asleep.
 void loop_beside_others(benchmark::State& state) {
   std::vector<Workers> others(static_cast<std::size_t>(state.range(0)), Workers(2));

@@ -4,7 +4,9 @@
 
 #include <array>
 #include <atomic>
+#include <cfenv>
 #include <chrono>
+#include <new>
 #include <thread>
 #include <vector>
 
@@ -22,12 +24,15 @@ bool all_are(const Counts& counts, int expected) {
 
 TEST(Workers, RunsEachChunkOnce) {
   for (const int threads : {1, 2, 5}) {
+    Counts counts(4);
     std::array<std::array<std::size_t, 2>, 4> ranges{};
     Workers(threads).for_chunks(10, 3, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+      ++counts[chunk];
       ranges[chunk] = {begin, end};
     });
     const std::array<std::array<std::size_t, 2>, 4> expected{{{0, 3}, {3, 6}, {6, 9}, {9, 10}}};
     EXPECT_EQ(ranges, expected) << threads;
+    EXPECT_TRUE(all_are(counts, 1)) << threads;
   }
 }
 
@@ -38,18 +43,20 @@ TEST(Workers, RunsNothingForNothing) {
   }
 }
 
-// Both functions wait for the other one to have begun.
+// Each function waits until the other one has begun.
 TEST(Workers, RunsBothAtTheSameTime) {
-  std::atomic<int> begun = 0;
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  std::atomic<int> begun = 0, met = 0;
   const auto meet = [&] {
-    for (++begun; begun < 2;) std::this_thread::yield();
+    for (++begun; begun < 2 && std::chrono::steady_clock::now() < deadline;) std::this_thread::yield();
+    if (begun == 2) ++met;
   };
   Workers(2).run_both(meet, meet);
-  EXPECT_EQ(begun, 2);
+  EXPECT_EQ(met, 2);
 }
 
 TEST(Workers, RunsLoopsInsideLoops) {
-  const Workers outer(4), inner(4);
+  const Workers outer(4), inner(3);
   Counts counts(6 * 50);
   outer.for_chunks(6, 1, [&](std::size_t chunk, std::size_t, std::size_t) {
     inner.for_chunks(50, 1,
@@ -66,7 +73,9 @@ TEST(Workers, AChunkIsNotBegunInsideAnother) {
   std::atomic<int> deepest = 0;
   for (int loop = 0; loop < 30; ++loop) {
     workers.for_chunks(64, 1, [&](std::size_t, std::size_t, std::size_t) {
-      if (++depth > deepest) deepest = depth;
+      ++depth;
+      for (int before = deepest; depth > before && !deepest.compare_exchange_weak(before, depth);) {
+      }
       workers.for_chunks(4, 1, [](std::size_t k, std::size_t, std::size_t) {
         std::this_thread::sleep_for(std::chrono::microseconds(50 * k));
       });
@@ -92,6 +101,37 @@ TEST(Workers, RunsLoopsOfSeveralThreads) {
   }
   for (std::thread& caller : callers) caller.join();
   EXPECT_TRUE(all_are(counts, 4 * kLoops));
+}
+
+int settings_in_chunks(const Workers& workers) {
+  std::atomic<int> result = std::fegetround();
+  workers.for_chunks(64, 1, [&](std::size_t, std::size_t, std::size_t) {
+    std::this_thread::sleep_for(std::chrono::microseconds(20));
+    if (std::fegetround() != result) result = -1;
+  });
+  return result;
+}
+
+// A program may have other settings in one thread, for example a game engine.
+TEST(Workers, ALoopHasTheFloatingPointSettingsOfItsCaller) {
+  const Workers workers(3);
+  const int before = std::fegetround();
+  std::thread([&] {
+    std::fesetround(FE_UPWARD);
+    EXPECT_EQ(settings_in_chunks(workers), FE_UPWARD);
+  }).join();
+  EXPECT_EQ(settings_in_chunks(workers), before);
+}
+
+TEST(Workers, AChunkThatThrowsLeavesTheNextLoopAsItWas) {
+  const Workers workers(2);
+  EXPECT_THROW(
+      workers.for_chunks(
+          8, 1, [](std::size_t k, std::size_t, std::size_t) { k == 3 ? throw std::bad_alloc() : void(); }),
+      std::bad_alloc);
+  std::atomic<int> begun = 0;
+  workers.for_chunks(8, 1, [&](std::size_t, std::size_t, std::size_t) { ++begun; });
+  EXPECT_EQ(begun, 8);
 }
 
 }  // namespace

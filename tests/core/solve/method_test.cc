@@ -133,6 +133,23 @@ TEST_P(EveryMethod, GivesTheSameBitsOnAnyNumberOfThreads) {
   }
 }
 
+TEST(QuasiNewton, HasAtMostOneThreadForEachThousandVertices) {
+  const auto threads_of = [](int nx, int ny, int most) {
+    const TriangleMesh mesh = grid(nx, ny, 2);
+    HandleSet handles;
+    (void)handles.set("left", {slice(mesh, 0, 0, 0), Fixed{}});
+    return deformer(rest_shape(mesh), handles, Material::uniform(2), {.threads = most})
+        ->solve({})
+        .value()
+        .threads;
+  };
+  EXPECT_EQ(threads_of(9, 9, 8), 1);    // 100 vertices
+  EXPECT_EQ(threads_of(26, 73, 8), 1);  // 1,998
+  EXPECT_EQ(threads_of(39, 49, 8), 2);  // 2,000
+  EXPECT_EQ(threads_of(49, 99, 8), 5);  // 5,000
+  EXPECT_EQ(threads_of(49, 99, 3), 3);
+}
+
 // Large enough for factorisations and back-substitutions by several threads.
 TEST(QuasiNewton, GivesTheSameBitsOnAnyNumberOfThreadsWhereItsMetricIsShared) {
   const int side = 140;
