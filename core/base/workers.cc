@@ -61,25 +61,33 @@ class ChunkLoop {
   }
   void operator()(std::size_t chunk) const {
     happens_after(&called_);
-    {
-      const InChunk guard;
-      run_(chunk);
-    }
-    happens_before(&done_);
+    const Release release{&done_};
+    const InChunk guard;
+    run_(chunk);
   }
   void run_in(tbb::task_arena& arena) const {
     happens_before(&called_);
+    const Acquire acquire{&done_};
     arena.execute(*this);
-    happens_after(&done_);
   }
   /// Inside a chunk of another loop. The thread takes no chunk of that loop while it waits for this one.
   void run_in_present_arena() const {
     happens_before(&called_);
+    const Acquire acquire{&done_};
     tbb::this_task_arena::isolate(*this);
-    happens_after(&done_);
   }
 
  private:
+  /// Announce the order at their end, also where a chunk has thrown.
+  struct Release {
+    ~Release() { happens_before(point); }
+    const void* point;
+  };
+  struct Acquire {
+    ~Acquire() { happens_after(point); }
+    const void* point;
+  };
+
   const std::function<void(std::size_t)>& run_;
   const std::size_t chunks_;
   /// Takes the caller's floating-point settings along. An arena keeps those of the thread that first used it.
@@ -121,6 +129,8 @@ class IdleArenas {
   }
 
  private:
+  IdleArenas() { idle_.reserve(most_); }
+
   const std::size_t most_ = static_cast<std::size_t>(available_cores());
   std::mutex mutex_;  // is never waited for: after a fork nobody might release it
   std::vector<std::unique_ptr<tbb::task_arena>> idle_;
@@ -129,9 +139,9 @@ class IdleArenas {
 }  // namespace
 
 /// Without this, oneTBB never starts more threads than there are cores, however many an arena asks for. It obeys the lowest of all
-/// limits, so this one is the same for all.
+/// limits, so this one is the same for all. It never has more threads than this, or four times the cores.
 struct Workers::MoreThanCores {
-  tbb::global_control control{tbb::global_control::max_allowed_parallelism, 1024};
+  tbb::global_control control{tbb::global_control::max_allowed_parallelism, 256};
 };
 
 Workers::Workers(int threads) : threads_(threads) {

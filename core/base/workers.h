@@ -12,8 +12,8 @@ namespace lpdeform {
 /// while no loop runs, so a process may have thousands.
 class Workers {
  public:
-  /// At most `threads` >= 1 threads are used, including the calling one; 1 runs everything inline. Inside a chunk of another loop the
-  /// limit is that of the outermost loop.
+  /// At most `threads` >= 1 threads are used, including the calling one; 1 runs everything inline. In a loop inside a chunk of
+  /// another one, it is that of the outermost loop that has several threads.
   explicit Workers(int threads);
 
   int threads() const { return threads_; }

@@ -117,7 +117,7 @@ struct OpenOptions {
   WeightKind weights = WeightKind::kCotangent;
   FreeComponents free_components = FreeComponents::kError;
   int threads =
-      0;  // 1 to 1024; 0: as many as there are cores. A mesh has at most one for each 1,000 vertices. Results are the same on any number.
+      0;  // 1 to 1024; 0: as many as there are cores. A solve has at most one for each 1,000 vertices. Results are the same on any number.
 };
 
 enum class Method { kAuto, kQuasiNewton, kMultiresolution, kLineSearch, kLocalGlobal, kConic };
