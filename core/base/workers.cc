@@ -139,7 +139,7 @@ class IdleArenas {
 }  // namespace
 
 /// Without this, oneTBB never starts more threads than there are cores, however many an arena asks for. It obeys the lowest of all
-/// limits, so this one is the same for all. It never has more threads than this, or four times the cores.
+/// limits, so this one is the same for all. oneTBB never has more threads than 256 or four times the cores, whichever is more.
 struct Workers::MoreThanCores {
   tbb::global_control control{tbb::global_control::max_allowed_parallelism, 256};
 };
