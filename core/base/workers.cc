@@ -139,9 +139,10 @@ class IdleArenas {
 }  // namespace
 
 /// Without this, oneTBB never starts more threads than there are cores, however many an arena asks for. It obeys the lowest of all
-/// limits, so this one is the same for all. oneTBB never has more threads than 256 or four times the cores, whichever is more.
+/// limits, so this one is the same for all: the most that oneTBB ever has.
 struct Workers::MoreThanCores {
-  tbb::global_control control{tbb::global_control::max_allowed_parallelism, 256};
+  tbb::global_control control{tbb::global_control::max_allowed_parallelism,
+                              static_cast<std::size_t>(std::max(256, 4 * available_cores()))};
 };
 
 Workers::Workers(int threads) : threads_(threads) {
@@ -159,7 +160,7 @@ void Workers::for_chunks(std::size_t count, std::size_t chunk_size,
     for (std::size_t chunk = 0; chunk < chunks; ++chunk) run(chunk);
     return;
   }
-  const std::function<void(std::size_t)> run_chunk = run;
+  const std::function<void(std::size_t)> run_chunk = std::ref(run);  // which allocates nothing
   const ChunkLoop loop(chunks, run_chunk);
   if (is_in_chunk) return loop.run_in_present_arena();
   std::unique_ptr<tbb::task_arena> arena = IdleArenas::of_process().take(threads_);
