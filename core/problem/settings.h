@@ -16,8 +16,8 @@ enum class Method {
 };
 
 enum class InitialGuess {
-  /// Warm start: from the Deformer's state. If this handle move continues the last one, the surface moves on as it did
-  /// then; the remaining displacement of the handles is extended harmonically. kLaplacian if there is no state yet.
+  /// Warm start: from the Deformer's state. If this handle move continues the last one, the surface goes on as it did then. If not, the
+  /// displacement of the handles is extended harmonically. kLaplacian if there is no state yet.
   kCurrent,
   kLaplacian,  // the naive Laplacian deformation, no rotations (section 4)
   kRest,       // the rest mesh, handles at their targets

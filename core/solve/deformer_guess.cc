@@ -4,6 +4,8 @@
 #include <optional>
 #include <utility>
 
+#include "core/solve/turns.h"
+
 namespace lpdeform {
 namespace {
 
@@ -13,9 +15,12 @@ constexpr double kSameWay = 0.5;      // two moves count as one drag above this 
 // In such a drag, the squared ratio of the surface's largest move to the handles' largest move is below this.
 constexpr double kSteady = 9;
 constexpr double kMostAbove = 2;      // see is_good
+constexpr double kClose = 1.25;       // see is_close
 constexpr double kLittleAbove = 1.2;  // see is_as_good_as_before
-// Moves that coarse levels lead after guess_alone has refused, and where there was no time for an iteration after it.
+// Moves that coarse levels lead after guess_alone has refused, and where there was no time for an iteration after a guess that was not close.
 constexpr int kMovesToLead = 3, kMovesToLeadWithoutTime = 12;
+// Where coarse levels can lead, edges turn on after a move of at least this many iterations; see continued.
+constexpr int kTimeToTurn = 4;
 
 template <typename Body>
 void for_rows(const Points& points, const Workers& workers, const Body& body) {
@@ -56,6 +61,21 @@ Points Deformer::Impl::laplacian_guess() {
   return shape->scaled_positions() + u;
 }
 
+/// The surface `moved`, fitted between the targets of held vertices in the metric, with `forces` as Metric::extend() takes them.
+Points Deformer::Impl::fitted(const Points& moved, const Points* forces) const {
+  Points u(moved.rows(), 3);
+  for (const std::int32_t i : constraints->exact.vertices)
+    u.row(i) = constraints->targets.row(i) - moved.row(i);
+  metric.extend(constraints->is_held, u, workers(), forces);
+  for_rows(u, workers(), [&](Eigen::Index i) {
+    if (constraints->is_held[i])
+      u.row(i) = constraints->targets.row(i);
+    else
+      u.row(i) += moved.row(i);
+  });
+  return u;
+}
+
 /// A drag that the coarse level leads: it goes to the handles first, and the surface goes with it. Each edge turns as the surface
 /// around it does, and one solve in the metric fits the edges together between the handles.
 std::optional<Points> Deformer::Impl::led_guess() {
@@ -67,18 +87,8 @@ std::optional<Points> Deformer::Impl::led_guess() {
   if (!motion) return std::nullopt;
   const Points& moved = motion->positions;
   const Points forces = metric.turning_forces(from, moved, motion->turns, workers());
-  Points u(x.rows(), 3);
-  for (const std::int32_t i : constraints->exact.vertices)
-    u.row(i) = constraints->targets.row(i) - moved.row(i);
-  metric.extend(constraints->is_held, u, workers(), &forces);
-  for_rows(u, workers(), [&](Eigen::Index i) {
-    if (constraints->is_held[i])
-      u.row(i) = constraints->targets.row(i);
-    else
-      u.row(i) += moved.row(i);
-  });
   lead = Lead::kTogether;
-  return u;
+  return fitted(moved, &forces);
 }
 
 /// Whether a led guess is not much worse than the other one: at p = 2 its E^(1/2) is at most kMostAbove times as high. It may be higher,
@@ -115,35 +125,35 @@ bool Deformer::Impl::is_at_targets(const Points& from) const {
                      [&](std::int32_t i) { return from.row(i) == constraints->targets.row(i); });
 }
 
-/// Extrapolates a drag from x: if the handles move in about the same way as in the last move, by the factor `share` of that move,
-/// the surface does the same. The remaining displacement of handles and soft targets is extended harmonically. `forces` are
-/// those of soft targets, or null.
+/// Goes on with a drag from x. If the handles move in about the same way as in the last move, by the factor `share` of that move, the
+/// surface does the same. Each edge turns on as it has turned, and one solve in the metric fits the edges together between the handles.
+/// On straight lines the surface would be stretched by the square of the angle. Where coarse levels can lead, edges turn on only after a
+/// guess alone that was close, or after a move with time for iterations. Turning takes longer, and leaves a surface that is behind as far
+/// behind. Straight lines also take on what the last iterations have corrected. If the handles move in another way, their displacement is
+/// extended harmonically, with `forces`, those of soft targets, or null.
 Points Deformer::Impl::continued(const Points* forces) const {
-  const bool has_moved = x_before_move.rows() == x.rows();
+  if (x_before_move.rows() != x.rows()) return fitted(x, forces);
   const auto last = [this](Eigen::Index i) -> Eigen::RowVector3d { return x.row(i) - x_before_move.row(i); };
-  Points u(x.rows(), 3);
   double along = 0, size = 0, left = 0, longest = 0;
   for (const std::int32_t i : constraints->exact.vertices) {
-    u.row(i) = constraints->targets.row(i) - x.row(i);
-    left += u.row(i).squaredNorm();
-    if (!has_moved) continue;
-    along += u.row(i).dot(last(i));
+    const Eigen::RowVector3d to_go = constraints->targets.row(i) - x.row(i);
+    left += to_go.squaredNorm();
+    along += to_go.dot(last(i));
     size += last(i).squaredNorm();
     longest = std::max(longest, last(i).squaredNorm());
   }
   const double share = size > 0 ? along / size : 0;
   const bool goes_on = share > 0 && share < kFarthestGuess && along * along > kSameWay * size * left &&
                        longest_move(x_before_move, x, workers()) < kSteady * longest;
-  if (goes_on) {
-    forces = nullptr;  // soft targets move with the drag
-    for (const std::int32_t i : constraints->exact.vertices) u.row(i) -= share * last(i);
-  }
-  metric.extend(constraints->is_held, u, workers(), forces);
-  for_rows(u, workers(), [&](Eigen::Index i) {
-    if (goes_on) u.row(i) += share * last(i);
-    u.row(i) += x.row(i);
-  });
-  return u;
+  if (!goes_on) return fitted(x, forces);
+  Points moved(x.rows(), 3);
+  for_rows(moved, workers(), [&](Eigen::Index i) { moved.row(i) = x.row(i) + share * last(i); });
+  const bool turns_on =
+      !CoarseLevel::can_lead(*shape, least_bending()) || is_close || fine_iterations >= kTimeToTurn;
+  if (!turns_on) return fitted(moved, nullptr);
+  const Points turning =
+      metric.turning_forces(x, moved, turns_between(*shape, x_before_move, x, share, workers()), workers());
+  return fitted(moved, &turning);  // soft targets move with the drag
 }
 
 /// The guess of a drag that the coarse levels do not lead. It takes half of the time. nullopt if it is not good enough: if its E^(1/2)
@@ -155,13 +165,11 @@ std::optional<Points> Deformer::Impl::guess_alone() {
       [&] {
         least = coarse->least_energy(coarse_inputs(effective_material()), InitialGuess::kCurrent, stop);
       },
-      [&] {
-        guess = continued(nullptr);
-        for (const std::int32_t i : constraints->exact.vertices) guess.row(i) = constraints->targets.row(i);
-      });
+      [&] { guess = continued(nullptr); });
   if (!least || !guess.allFinite()) return std::nullopt;
   objective.evaluate(guess, even_norm());
   if (!is_near(*least, kMostOverLeast)) return std::nullopt;
+  is_close = is_near(*least, kClose);
   is_guess_evaluated = true;
   return guess;
 }
@@ -180,7 +188,7 @@ Points Deformer::Impl::current_guess() {
     return x;
   }
   const bool can_lead = warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, least_bending());
-  const bool had_no_time = std::exchange(goes_alone, false) && fine_iterations == 0;
+  const bool had_no_time = std::exchange(goes_alone, false) && !is_close && fine_iterations == 0;
   if (had_no_time) moves_to_lead = kMovesToLeadWithoutTime;
   const bool is_to_lead = moves_to_lead > 0;
   if (is_to_lead) --moves_to_lead;
@@ -193,6 +201,7 @@ Points Deformer::Impl::current_guess() {
     }
     moves_to_lead = kMovesToLead;
   }
+  is_close = false;
   std::optional<Points> led = can_lead ? led_guess() : std::nullopt;
   if (led && is_as_good_as_before(*led)) {
     x_before_move = x;

@@ -57,6 +57,12 @@ TEST_P(LedDragTest, KeepsNearTheMinimumAlsoWithoutAnyIteration) {
   EXPECT_LE(above_minimum(move(12, 0)), GetParam() == 6 ? 3 : 1.4);
 }
 
+/// On straight lines it was over 1.05 at each p, and 1.6 at p = 6.
+TEST_P(LedDragTest, AGuessIsNearTheMinimumWhereMovesConverge) {
+  for (int number = 1; number < 6; ++number) (void)move(number, 1000);
+  EXPECT_LE(above_minimum(move(6, 0)), 1.05);
+}
+
 TEST_P(LedDragTest, FramesDoNotJump) {
   Points before;
   double farthest = 0, of_handle = 0;
@@ -137,6 +143,13 @@ TEST_P(LedDragAtSixTest, ItsFirstMovesHaveFewKinks) {
 INSTANTIATE_TEST_SUITE_P(AtSix, LedDragAtSixTest, testing::Values(6.0));
 
 class LedDragAtTwoTest : public LedDragTest {};
+
+/// It was 1.21 when guesses went along straight lines, and coarse levels led after a move without iterations.
+TEST_P(LedDragAtTwoTest, StaysNearWithoutIterationsOnceItIsNear) {
+  for (int number = 1; number < 8; ++number) (void)move(number, 20);
+  for (int number = 8; number < 11; ++number) (void)move(number, 0);
+  EXPECT_LE(above_minimum(move(11, 0)), 1.1);
+}
 
 TEST_P(LedDragAtTwoTest, IsAtTheMinimumWhereMovesHaveTimeForThreeIterations) {
   for (int number = 1; number < 12; ++number) (void)move(number, 3);
