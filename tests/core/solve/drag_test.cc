@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "core/shapes/paper_poses.h"
@@ -127,7 +128,7 @@ TEST_P(DragTest, ADragBackToTheStartEndsAtRest) {
 }
 
 /// A bumpy sheet whose edge turns by 9 degrees with each move. On straight lines the third guess would have 5.7, 2.3, 2.0 and 2.4 times
-/// the E^(1/p) of its minimum at p = 1, 1.5, 2 and 6. At p = 1 the kinks themselves move.
+/// the E^(1/p) of its minimum at p = 1, 1.5, 2 and 6. At p = 1 the kinks themselves move in some moves.
 TEST(TurningDragTest, TheSurfaceTurnsOn) {
   constexpr int kSide = 40, kMoves = 10;
   const TriangleMesh mesh = grid(kSide, kSide, 2);
@@ -145,16 +146,22 @@ TEST(TurningDragTest, TheSurfaceTurnsOn) {
   for (const double p : {1.0, 1.5, 2.0, 6.0}) {
     const auto live = deformer(rest_shape(mesh), handles_at(0), Material::uniform(p));
     ASSERT_TRUE(live->solve({.effort = 0}).ok());
+    std::vector<double> above;  // E^(1/p) of guesses over that of the minimum
     for (int move = 1; move <= kMoves; ++move) {
       ASSERT_TRUE(live->set_handles(handles_at(move)).ok());
       ASSERT_TRUE(live->start({.effort = 0}).ok());
       const double guess = live->summary().energy;
       while (live->step()) {
       }
-      if (move < 3) continue;  // the first has no move before it, and the second one from rest
-      EXPECT_LE(std::pow(guess / live->summary().energy, 1 / p), p == 1 ? 2 : 1.05)
-          << "p " << p << ", move " << move;
+      above.push_back(std::pow(guess / live->summary().energy, 1 / p));
     }
+    above.erase(above.begin(),
+                above.begin() + 2);  // there is no move before the first, and one from rest before the second
+    std::ranges::sort(above);
+    if (p == 1)
+      EXPECT_LE(above[above.size() / 2], 1.25);
+    else
+      EXPECT_LE(above.back(), 1.05) << "p " << p;
   }
 }
 
