@@ -168,8 +168,9 @@ std::optional<Points> Deformer::Impl::guess_alone() {
       [&] { guess = continued(nullptr); });
   if (!least || !guess.allFinite()) return std::nullopt;
   objective.evaluate(guess, even_norm());
-  if (!is_near(*least, kMostOverLeast)) return std::nullopt;
-  is_close = is_near(*least, kClose);
+  const double over = over_least(*least);
+  if (!(over <= kMostOverLeast)) return std::nullopt;
+  is_close = over <= kClose;
   is_guess_evaluated = true;
   return guess;
 }

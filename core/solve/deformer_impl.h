@@ -60,7 +60,7 @@ struct Deformer::Impl {
   bool is_best_zero() const;
   Problem make_problem();
   bool can_judge_guesses() const;
-  bool is_near(double least, double times) const;
+  double over_least(double least) const;
   bool is_guess_good_enough() const;
   Method chosen_method(Method asked, bool is_warm);
   MakeLevelSolver level_maker(bool is_graded) const;

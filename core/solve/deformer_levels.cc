@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -110,18 +111,18 @@ bool Deformer::Impl::can_judge_guesses() const {
          constraints->linear.empty() && CoarseLevel::can_lead(*shape, least_bending());
 }
 
-/// Whether the E^(1/2) of the last evaluation of `objective` is at most `times` that of the lowest level. At p = 2. Stiffness counts: where
-/// it is low, large E_i are no sign of a bad guess.
-bool Deformer::Impl::is_near(double least, double times) const {
+/// The E^(1/2) of the last evaluation of `objective` over that of the lowest level, at p = 2. Stiffness counts: where it is low, large E_i
+/// are no sign of a bad guess.
+double Deformer::Impl::over_least(double least) const {
   const LpNorm weighted(effective_material(), shape->vertex_count(), unit(), 1);
-  return weighted.true_energy(objective.sum(weighted)) <= times * times * least;
+  return std::sqrt(weighted.true_energy(objective.sum(weighted)) / least);
 }
 
 /// Whether a cold solve does without a coarse level, because its guess, the last evaluation of `objective`, is good enough already. The
 /// limit is lower on large meshes, where what is left takes the fine level longer than the coarse levels.
 bool Deformer::Impl::is_guess_good_enough() const {
   return least_of_lowest &&
-         is_near(*least_of_lowest, std::min(kMostOverLeast, 1 + kWorthGoing / shape->vertex_count()));
+         over_least(*least_of_lowest) <= std::min(kMostOverLeast, 1 + kWorthGoing / shape->vertex_count());
 }
 
 Method Deformer::Impl::chosen_method(Method asked, bool is_warm) {
