@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
@@ -15,6 +16,12 @@
 
 namespace lpdeform {
 namespace {
+
+/// A position in the caller's units, as given.
+struct GivenPosition {
+  std::int32_t vertex;
+  Eigen::RowVector3d at;
+};
 
 /// `hold` is called with each vertex that is held exactly, its target in scaled units and in the caller's.
 template <typename HoldVertex>
@@ -55,13 +62,16 @@ void drop_void_rows(const std::vector<char>& may_move, Holds& holds) {
 
 /// Holds all vertices outside the region at their positions in `outside`, and unreferenced vertices where handles have them.
 void hold_outside(const RestShape& shape, const std::vector<char>& may_move, const Points& outside,
-                  Points& exact, Constraints& constraints) {
+                  std::vector<GivenPosition>& exact, Constraints& constraints) {
   for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
     if (may_move[i]) continue;
-    constraints.is_held[i] = true;
-    if (shape.components()[i] < 0) continue;
+    const bool has_handle = std::exchange(constraints.is_held[i], true);
+    if (shape.components()[i] < 0) {
+      if (!has_handle) exact.push_back({i, shape.positions().row(i)});
+      continue;
+    }
     constraints.targets.row(i) = (outside.row(i) - shape.centre()) / shape.mean_edge_length();
-    exact.row(i) = outside.row(i);
+    exact.push_back({i, outside.row(i)});
   }
 }
 
@@ -129,7 +139,8 @@ Points component_centres(const RestShape& shape) {
 
 /// Holds every vertex of the components that no handle holds, at rest or moved, as `free_components` says.
 void hold_free_components(const RestShape& shape, const HandleSet& handles, FreeComponents free_components,
-                          const std::vector<char>& has_handle, Points& exact, Constraints& constraints) {
+                          const std::vector<char>& has_handle, std::vector<GivenPosition>& exact,
+                          Constraints& constraints) {
   std::vector<RigidTransform> motions(shape.component_count());
   if (free_components == FreeComponents::kFollow) {
     const Points centres = component_centres(shape);
@@ -142,18 +153,25 @@ void hold_free_components(const RestShape& shape, const HandleSet& handles, Free
     if (component < 0 || has_handle[component]) continue;
     constraints.is_held[i] = true;
     constraints.targets.row(i) = motions[component](shape.scaled_positions().row(i));
-    if (free_components == FreeComponents::kStay) continue;
-    exact.row(i) = constraints.targets.row(i) * shape.mean_edge_length() + shape.centre();
+    if (free_components == FreeComponents::kStay)
+      exact.push_back({i, shape.positions().row(i)});
+    else
+      exact.push_back({i, constraints.targets.row(i) * shape.mean_edge_length() + shape.centre()});
   }
 }
 
-HeldPositions held_rows(const std::vector<char>& is_held, const Points& positions) {
+/// The positions of held vertices. `given` has each of them; of several for one vertex the last counts.
+HeldPositions held_positions(const std::vector<char>& is_held, const std::vector<GivenPosition>& given) {
   HeldPositions result;
+  std::vector<std::int32_t> place(is_held.size());
   for (std::size_t i = 0; i < is_held.size(); ++i) {
-    if (is_held[i]) result.vertices.push_back(static_cast<std::int32_t>(i));
+    if (!is_held[i]) continue;
+    place[i] = static_cast<std::int32_t>(result.vertices.size());
+    result.vertices.push_back(static_cast<std::int32_t>(i));
   }
   result.vertices.shrink_to_fit();
-  result.positions = rows_of(positions, result.vertices);
+  result.positions.resize(static_cast<Eigen::Index>(result.vertices.size()), 3);
+  for (const GivenPosition& one : given) result.positions.row(place[one.vertex]) = one.at;
   return result;
 }
 
@@ -170,12 +188,12 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
                           {},
                           {},
                           footprint_stiffness(shape, handles)};
-  Points exact = shape.positions();
+  std::vector<GivenPosition> exact;
   Holds holds;
   const auto hold = [&](std::int32_t vertex, const auto& scaled, const auto& as_given) {
     constraints.is_held[vertex] = true;
     constraints.targets.row(vertex) = scaled;
-    exact.row(vertex) = as_given;
+    exact.push_back({vertex, as_given});
   };
   if (status = hold_handles(shape, handles, holds, hold); !status.ok()) return status;
   const std::vector<char> may_move = movable_vertices(shape, handles.region());
@@ -188,7 +206,7 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
   }
   if (free != is_tied.end())
     hold_free_components(shape, handles, free_components, is_tied, exact, constraints);
-  constraints.exact = held_rows(constraints.is_held, exact);
+  constraints.exact = held_positions(constraints.is_held, exact);
   constraints.soft = std::move(holds.soft);
   auto linear = LinearConstraints::create(std::move(holds.rows), constraints.is_held);
   if (!linear.ok()) return linear.status();

@@ -17,6 +17,7 @@ constexpr double kSteady = 9;
 constexpr double kMostAbove = 2;      // see is_good
 constexpr double kClose = 1.25;       // see is_close
 constexpr double kLittleAbove = 1.2;  // see is_as_good_as_before
+constexpr double kHardlyAbove = 1.1;  // see may_be_shown
 // Moves that coarse levels lead after guess_alone has refused, and where there was no time for an iteration after a guess that was not close.
 constexpr int kMovesToLead = 3, kMovesToLeadWithoutTime = 12;
 // Where coarse levels can lead, edges turn on after a move of at least this many iterations; see continued.
@@ -106,6 +107,24 @@ bool Deformer::Impl::is_as_good_as_before(const Points& led) {
   return is_guess_evaluated = objective.evaluate(led, even_norm()) * unit() * unit() <= most;
 }
 
+/// Whether a guess of the fine level alone, the last evaluation of `objective`, may be shown before the first iteration: its E^(1/2) is at most
+/// kHardlyAbove times as high as that of the state before the move.
+bool Deformer::Impl::may_be_shown() const {
+  const double most = kHardlyAbove * kHardlyAbove * best_energies.squaredNorm();
+  return are_cells_alike() && objective.sum(even_norm()) * unit() * unit() <= most;
+}
+
+/// Whether all cells have the same stiffness. Only then does a sum without it tell about a guess.
+bool Deformer::Impl::are_cells_alike() const {
+  return material.stiffness.size() == 1 && constraints->footprint.size() == 0;
+}
+
+/// Remembers the state before a move.
+void Deformer::Impl::begin_move() {
+  x_before_move.resize(x.rows(), 3);
+  for_rows(x, workers(), [&](Eigen::Index i) { x_before_move.row(i) = x.row(i); });
+}
+
 /// Begins with a led guess. If some p_i > 2, the weights of the move before differ so much that a step in their metric is cut short.
 Points Deformer::Impl::go_with(Points led) {
   if (material.p.maxCoeff() > 2) warmth = Warmth::kWarm;
@@ -172,6 +191,7 @@ std::optional<Points> Deformer::Impl::guess_alone() {
   if (!(over <= kMostOverLeast)) return std::nullopt;
   is_close = over <= kClose;
   is_guess_evaluated = true;
+  is_guess_smooth = may_be_shown();
   return guess;
 }
 
@@ -185,7 +205,7 @@ Points Deformer::Impl::current_guess() {
   }
   if (is_at_targets(x) && (!forces || forces->isZero(0))) {
     lead = Lead::kNone;  // the fine level goes on alone
-    x_before_move = x;
+    begin_move();
     return x;
   }
   const bool can_lead = warmth != Warmth::kCold && CoarseLevel::can_lead(*shape, least_bending());
@@ -196,7 +216,7 @@ Points Deformer::Impl::current_guess() {
   if (can_lead && lead == Lead::kTogether && can_judge_guesses() && !is_to_lead) {
     if (std::optional<Points> alone = guess_alone()) {
       coarse->go_alone(x);
-      x_before_move = x;
+      begin_move();
       goes_alone = true;
       return *std::move(alone);
     }
@@ -205,14 +225,13 @@ Points Deformer::Impl::current_guess() {
   is_close = false;
   std::optional<Points> led = can_lead ? led_guess() : std::nullopt;
   if (led && is_as_good_as_before(*led)) {
-    x_before_move = x;
-    // At a larger p, kinks of a guess show. Stiffness does not count in what was compared.
-    is_guess_smooth = material.p.maxCoeff() <= 2 && material.stiffness.size() == 1 &&
-                      constraints->footprint.size() == 0 && constraints->linear.empty();
+    begin_move();
+    // At a larger p, kinks of a guess show.
+    is_guess_smooth = material.p.maxCoeff() <= 2 && are_cells_alike() && constraints->linear.empty();
     return go_with(*std::move(led));
   }
   Points guess = continued(forces ? &*forces : nullptr);
-  x_before_move = x;
+  begin_move();
   if (!can_lead) return guess;
   if (!guess.allFinite()) {
     lead = Lead::kNone;

@@ -17,7 +17,6 @@ namespace {
 constexpr int kMostTogether = 12;          // fine iterations after a coarse level's, for which it leads on
 constexpr double kCertificateSeconds = 1;  // it may take this long, even beyond the time limit
 constexpr std::size_t kCopyChunk = 4096;   // vertices
-constexpr double kRounding = 1e-13;        // relative to the largest coordinate, in scaled units
 
 using Clock = std::chrono::steady_clock;
 
@@ -43,14 +42,10 @@ double Deformer::Impl::typical_energy(const Points& guess) {
   return largest > 1e-12 ? largest : 1.0;
 }
 
-/// The rounding error of a length.
-double Deformer::Impl::rounding() const {
-  return kRounding * (1 + constraints->targets.cwiseAbs().maxCoeff());
-}
-
 /// The objective if every E_i is only rounding error.
 double Deformer::Impl::zero_objective() const {
   const double e2 = rounding() * rounding();
+  if (norm->is_uniform()) return shape->vertex_count() * norm->term(0, e2).value;
   double sum = 0;
   for (std::int32_t i = 0; i < shape->vertex_count(); ++i) sum += norm->term(i, e2).value;
   return sum;
@@ -369,6 +364,7 @@ void Deformer::Impl::replace_constraints(Constraints next) {
       lead = Lead::kNone;
   }
   constraints = std::move(next);
+  largest_target = constraints->targets.cwiseAbs().maxCoeff();
 }
 
 }  // namespace lpdeform

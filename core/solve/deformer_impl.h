@@ -34,6 +34,8 @@ struct Deformer::Impl {
   /// A guess whose E^(1/2) is at most this many times that of the lowest level needs no coarse level.
   static constexpr double kMostOverLeast = 1.8;
 
+  static constexpr double kRounding = 1e-13;  // relative to the largest coordinate, in scaled units
+
   double unit() const { return shape->mean_edge_length(); }
   const Workers& workers() const { return objective.cells().workers(); }
   double length_unit() const { return material.length_unit > 0 ? material.length_unit : unit(); }
@@ -47,6 +49,9 @@ struct Deformer::Impl {
   void follow(const Points& guess);
   bool is_good(const Points& led, const Points& other);
   bool is_as_good_as_before(const Points& led);
+  bool may_be_shown() const;
+  bool are_cells_alike() const;
+  void begin_move();
   bool is_at_targets(const Points& from) const;
   Points go_with(Points led);
   FineInputs coarse_inputs(const Material& effective) const;
@@ -54,7 +59,8 @@ struct Deformer::Impl {
   Points initial_guess(InitialGuess guess);
   LpNorm even_norm() const;
   double typical_energy(const Points& guess);
-  double rounding() const;
+  /// The rounding error of a length.
+  double rounding() const { return kRounding * (1 + largest_target); }
   double zero_objective() const;
   double zero_squares() const;
   bool is_best_zero() const;
@@ -134,6 +140,7 @@ struct Deformer::Impl {
   Material material;
   Field bending = Field::Ones(1);  // see set_bending()
   std::optional<Constraints> constraints;
+  double largest_target = 0;              // the largest coordinate of its targets
   std::shared_ptr<const Points> outside;  // where vertices outside the region are held, in the caller's units
 
   // The state, in scaled units: the best of the last solve, or what was set.
