@@ -125,6 +125,14 @@ void Deformer::Impl::begin_move() {
   for_rows(x, workers(), [&](Eigen::Index i) { x_before_move.row(i) = x.row(i); });
 }
 
+/// The same at p = 2 without making the other guess, which is known to have more than kMostOverLeast times the E^(1/2) of the lowest level.
+/// `objective` holds the evaluation of the led one.
+bool Deformer::Impl::is_led_near_lowest() {
+  if (!can_judge_guesses()) return false;
+  const auto least = coarse->least_energy(coarse_inputs(effective_material()), InitialGuess::kCurrent, stop);
+  return is_guess_evaluated = least && over_least(*least) <= kMostAbove * kMostOverLeast;
+}
+
 /// Begins with a led guess. If some p_i > 2, the weights of the move before differ so much that a step in their metric is cut short.
 Points Deformer::Impl::go_with(Points led) {
   if (material.p.maxCoeff() > 2) warmth = Warmth::kWarm;
@@ -228,6 +236,10 @@ Points Deformer::Impl::current_guess() {
     begin_move();
     // At a larger p, kinks of a guess show.
     is_guess_smooth = material.p.maxCoeff() <= 2 && are_cells_alike() && constraints->linear.empty();
+    return go_with(*std::move(led));
+  }
+  if (led && is_led_near_lowest()) {
+    begin_move();
     return go_with(*std::move(led));
   }
   Points guess = continued(forces ? &*forces : nullptr);
