@@ -10,6 +10,7 @@
 #define HWY_TARGET_INCLUDE "core/energy/cell_kernel.cc"
 #include <hwy/foreach_target.h>
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -151,6 +152,10 @@ void GradientOfBlocks(const CellBlocks& blocks, std::size_t first, std::size_t l
   };
   for (std::size_t block = first; block < last; ++block) {
     const std::size_t begin = blocks.first_slot[block], end = blocks.first_slot[block + 1];
+    if (block + 1 < last) {  // residuals of other cells are anywhere, and of a large mesh in no cache
+      for (std::size_t at = end * kLanes; at < blocks.first_slot[block + 2] * kLanes; ++at)
+        hwy::Prefetch(&residual(blocks.opposite[at]));
+    }
     const std::int32_t* const cells = blocks.cells.data() + block * kLanes;
     for (std::size_t lane = 0; lane < kLanes && cells[lane] >= 0; ++lane) {
       const std::int32_t i = cells[lane];
