@@ -60,9 +60,10 @@ void drop_void_rows(const std::vector<char>& may_move, Holds& holds) {
   });
 }
 
-/// Holds all vertices outside the region at their positions in `outside`, and unreferenced vertices where handles have them.
+/// Holds all vertices outside the region at their positions in `outside`, and unreferenced vertices where handles have them or at rest.
 void hold_outside(const RestShape& shape, const std::vector<char>& may_move, const Points& outside,
                   std::vector<GivenPosition>& exact, Constraints& constraints) {
+  exact.reserve(exact.size() + static_cast<std::size_t>(std::count(may_move.begin(), may_move.end(), false)));
   for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
     if (may_move[i]) continue;
     const bool has_handle = std::exchange(constraints.is_held[i], true);

@@ -58,8 +58,8 @@ HWY_INLINE V minus_product(V sum, float factor, V value) {
 }
 #endif
 
-/// Supernodes between the one that is solved and the one whose values are fetched. In a large factor, values are in no cache, and
-/// processors do not read ahead over the ends of pages.
+/// How many supernodes ahead values are fetched. Those of a large factor are in no cache, and processors do not read ahead beyond the end
+/// of a page.
 constexpr std::ptrdiff_t kAhead = 2;
 
 HWY_INLINE void fetch(const Supernode& node, const float* all_values) {

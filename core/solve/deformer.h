@@ -87,10 +87,11 @@ class Deformer {
   /// their targets. settings.initial does not matter.
   absl::Status start_prepared(const SolveSettings& settings, std::stop_token stop = {});
 
-  /// Whether the initial guess may be shown before the first iteration. After start(), positions() are that guess. So it is in a drag
-  /// of a large mesh, if no p_i is above 2, stiffness is the same everywhere, there are no locks or points held exactly, and the guess
-  /// at p = 2 has at most 1.2 times the E^(1/2) of the state before the move where coarse levels lead, and 1.1 times where the fine
-  /// level goes alone. E^(1/p) is then as a rule within a few percent of that after the first iteration.
+  /// Whether the initial guess may be shown before the first iteration. After start(), positions() are that guess. It may in a drag of
+  /// a large mesh with the same stiffness everywhere, without soft handles, locks or points held exactly. What decides is the guess's
+  /// E^(1/2) at p = 2 over that of the state before the move. Where coarse levels lead, no p_i may be above 2, and the ratio is at most
+  /// 1.2. Where the fine level goes alone, each p_i is 2, and the ratio is at most 1.1. E^(1/p) is then as a rule within a few percent
+  /// of that after the first iteration.
   bool is_guess_smooth() const;
 
   /// Makes one iteration, or one step of a certificate. True while there is more to do; false when the summary is

@@ -107,6 +107,16 @@ bool Deformer::Impl::is_as_good_as_before(const Points& led) {
   return is_guess_evaluated = objective.evaluate(led, even_norm()) * unit() * unit() <= most;
 }
 
+/// The same without making the other guess, at p = 2. It compares the led guess with the lowest level. `is_refused` says that
+/// guess_alone has found the other one to have over kMostOverLeast times that energy. `objective` holds the evaluation of the led guess,
+/// from is_as_good_as_before.
+bool Deformer::Impl::is_led_near_lowest(const Points& led, bool is_refused) {
+  if (!can_judge_guesses() || !led.allFinite()) return false;
+  const auto least = coarse->least_energy(coarse_inputs(effective_material()), InitialGuess::kCurrent, stop);
+  const double most = is_refused ? kMostAbove * kMostOverLeast : kMostOverLeast;
+  return is_guess_evaluated = least && over_least(*least) <= most;
+}
+
 /// Whether a guess of the fine level alone, the last evaluation of `objective`, may be shown before the first iteration: its E^(1/2) is at most
 /// kHardlyAbove times as high as that of the state before the move.
 bool Deformer::Impl::may_be_shown() const {
@@ -123,14 +133,6 @@ bool Deformer::Impl::are_cells_alike() const {
 void Deformer::Impl::begin_move() {
   x_before_move.resize(x.rows(), 3);
   for_rows(x, workers(), [&](Eigen::Index i) { x_before_move.row(i) = x.row(i); });
-}
-
-/// The same at p = 2 without making the other guess, which is known to have more than kMostOverLeast times the E^(1/2) of the lowest level.
-/// `objective` holds the evaluation of the led one.
-bool Deformer::Impl::is_led_near_lowest() {
-  if (!can_judge_guesses()) return false;
-  const auto least = coarse->least_energy(coarse_inputs(effective_material()), InitialGuess::kCurrent, stop);
-  return is_guess_evaluated = least && over_least(*least) <= kMostAbove * kMostOverLeast;
 }
 
 /// Begins with a led guess. If some p_i > 2, the weights of the move before differ so much that a step in their metric is cut short.
@@ -221,7 +223,8 @@ Points Deformer::Impl::current_guess() {
   if (had_no_time) moves_to_lead = kMovesToLeadWithoutTime;
   const bool is_to_lead = moves_to_lead > 0;
   if (is_to_lead) --moves_to_lead;
-  if (can_lead && lead == Lead::kTogether && can_judge_guesses() && !is_to_lead) {
+  const bool is_to_judge = can_lead && lead == Lead::kTogether && can_judge_guesses() && !is_to_lead;
+  if (is_to_judge) {
     if (std::optional<Points> alone = guess_alone()) {
       coarse->go_alone(x);
       begin_move();
@@ -238,7 +241,7 @@ Points Deformer::Impl::current_guess() {
     is_guess_smooth = material.p.maxCoeff() <= 2 && are_cells_alike() && constraints->linear.empty();
     return go_with(*std::move(led));
   }
-  if (led && is_led_near_lowest()) {
+  if (led && is_led_near_lowest(*led, is_to_judge)) {
     begin_move();
     return go_with(*std::move(led));
   }

@@ -49,7 +49,7 @@ struct Deformer::Impl {
   void follow(const Points& guess);
   bool is_good(const Points& led, const Points& other);
   bool is_as_good_as_before(const Points& led);
-  bool is_led_near_lowest();
+  bool is_led_near_lowest(const Points& led, bool is_refused);
   bool may_be_shown() const;
   bool are_cells_alike() const;
   void begin_move();
