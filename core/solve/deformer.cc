@@ -23,7 +23,6 @@ constexpr std::size_t kCellBytes = 60, kEdgeBytes = 30;  // of CellPass: per ver
 // The coarse levels take about 1 / kCoarseShare more; of a fine shape of CoarseLevel::kLarge vertices or more, 1 / kCoarseShareOfLarge.
 constexpr std::size_t kCoarseShare = 4, kCoarseShareOfLarge = 6;
 constexpr std::int32_t kCoarsenBeforehand = 10000;  // vertices from which on cold solves have a coarse level
-constexpr std::size_t kChunk = 4096;                // vertices
 
 /// Memory of a Deformer without its metric.
 std::size_t bytes_beside_metric(const RestShape& shape) {
@@ -281,12 +280,8 @@ const Points& Deformer::positions() const {
     const double unit = self.unit();
     const Eigen::RowVector3d centre = self.shape->centre();
     self.positions.resize(self.x.rows(), 3);
-    self.workers().for_chunks(static_cast<std::size_t>(self.x.rows()), kChunk,
-                              [&](std::size_t, std::size_t begin, std::size_t end) {
-                                for (auto i = static_cast<Eigen::Index>(begin);
-                                     i < static_cast<Eigen::Index>(end); ++i)
-                                  self.positions.row(i) = unit * self.x.row(i) + centre;
-                              });
+    for_rows(self.x, self.workers(),
+             [&](Eigen::Index i) { self.positions.row(i) = unit * self.x.row(i) + centre; });
     const HeldPositions& exact = self.constraints->exact;
     for (std::size_t k = 0; k < exact.vertices.size(); ++k)
       self.positions.row(exact.vertices[k]) = exact.positions.row(static_cast<Eigen::Index>(k));

@@ -9,7 +9,6 @@
 namespace lpdeform {
 namespace {
 
-constexpr std::size_t kChunk = 4096;  // vertices
 constexpr double kFarthestGuess = 2;  // the guess continues the last move by less than this factor
 constexpr double kSameWay = 0.5;      // two moves count as one drag above this squared cosine between them
 // In such a drag, the squared ratio of the surface's largest move to the handles' largest move is below this.
@@ -23,19 +22,11 @@ constexpr int kMovesToLead = 3, kMovesToLeadWithoutTime = 12;
 // Where coarse levels can lead, edges turn on after a move of at least this many iterations; see continued.
 constexpr int kTimeToTurn = 4;
 
-template <typename Body>
-void for_rows(const Points& points, const Workers& workers, const Body& body) {
-  workers.for_chunks(
-      static_cast<std::size_t>(points.rows()), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
-        for (auto i = static_cast<Eigen::Index>(begin); i < static_cast<Eigen::Index>(end); ++i) body(i);
-      });
-}
-
 /// The squared length of the longest way that a vertex has moved.
 double longest_move(const Points& before, const Points& now, const Workers& workers) {
-  std::vector<double> longest((static_cast<std::size_t>(now.rows()) + kChunk - 1) / kChunk, 0.0);
+  std::vector<double> longest((static_cast<std::size_t>(now.rows()) + kRowChunk - 1) / kRowChunk, 0.0);
   for_rows(now, workers, [&](Eigen::Index i) {
-    double& chunk = longest[static_cast<std::size_t>(i) / kChunk];
+    double& chunk = longest[static_cast<std::size_t>(i) / kRowChunk];
     chunk = std::max(chunk, (now.row(i) - before.row(i)).squaredNorm());
   });
   return *std::max_element(longest.begin(), longest.end());
@@ -117,11 +108,11 @@ bool Deformer::Impl::is_led_near_lowest(const Points& led, bool is_refused) {
   return is_guess_evaluated = least && over_least(*least) <= most;
 }
 
-/// Whether a guess of the fine level alone, the last evaluation of `objective`, may be shown before the first iteration: its E^(1/2) is at most
+/// Whether a guess of the fine level alone, whose E_i^2 add up to `sum`, may be shown before the first iteration: its E^(1/2) is at most
 /// kHardlyAbove times as high as that of the state before the move.
-bool Deformer::Impl::may_be_shown() const {
+bool Deformer::Impl::may_be_shown(double sum) const {
   const double most = kHardlyAbove * kHardlyAbove * best_energies.squaredNorm();
-  return are_cells_alike() && objective.sum(even_norm()) * unit() * unit() <= most;
+  return are_cells_alike() && sum * unit() * unit() <= most;
 }
 
 /// Whether all cells have the same stiffness. Only then does a sum without it tell about a guess.
@@ -196,12 +187,12 @@ std::optional<Points> Deformer::Impl::guess_alone() {
       },
       [&] { guess = continued(nullptr); });
   if (!least || !guess.allFinite()) return std::nullopt;
-  objective.evaluate(guess, even_norm());
+  const double sum = objective.evaluate(guess, even_norm());
   const double over = over_least(*least);
   if (!(over <= kMostOverLeast)) return std::nullopt;
   is_close = over <= kClose;
   is_guess_evaluated = true;
-  is_guess_smooth = may_be_shown();
+  is_guess_smooth = may_be_shown(sum);
   return guess;
 }
 

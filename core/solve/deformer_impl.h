@@ -6,6 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/geometry.h"
+#include "core/base/workers.h"
 #include "core/certificate/certificate.h"
 #include "core/methods/minima_search.h"
 #include "core/methods/minimiser.h"
@@ -15,6 +17,19 @@
 #include "core/solve/deformer.h"
 
 namespace lpdeform {
+
+constexpr std::size_t kRowChunk = 4096;  // vertices
+
+/// Calls body(i) for each row of `points`, in parallel.
+template <typename Body>
+void for_rows(const Points& points, const Workers& workers, const Body& body) {
+  workers.for_chunks(static_cast<std::size_t>(points.rows()), kRowChunk,
+                     [&](std::size_t, std::size_t begin, std::size_t end) {
+                       for (auto i = static_cast<Eigen::Index>(begin); i < static_cast<Eigen::Index>(end);
+                            ++i)
+                         body(i);
+                     });
+}
 
 /// The state of a Deformer, and the loop of a solve. Initial guesses are in deformer_guess.cc, what has to do with coarse levels in
 /// deformer_levels.cc, the search for lower minima in deformer_search.cc, and everything else in deformer_impl.cc.
@@ -50,7 +65,7 @@ struct Deformer::Impl {
   bool is_good(const Points& led, const Points& other);
   bool is_as_good_as_before(const Points& led);
   bool is_led_near_lowest(const Points& led, bool is_refused);
-  bool may_be_shown() const;
+  bool may_be_shown(double sum) const;
   bool are_cells_alike() const;
   void begin_move();
   bool is_at_targets(const Points& from) const;
