@@ -95,6 +95,8 @@ class Metric {
 
   /// c_i as factored, clipped.
   double cell_weight(std::int32_t i) const { return scale_ * cell_weights_[i]; }
+  /// cell_weight() of all cells, over scale().
+  const std::vector<double>& relative_cell_weights() const { return cell_weights_; }
 
   /// Changes with every numeric factorisation; 0 before the first.
   std::uint64_t version() const { return version_; }

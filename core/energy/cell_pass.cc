@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/energy/turn_kernel.h"
+
 namespace lpdeform {
 namespace {
 
@@ -120,6 +122,19 @@ void CellPass::gradient(Points& result) const {
     gradient_of_blocks(blocks_, begin / kLanes, (end + kLanes - 1) / kLanes, state_, c.data(), result.data());
   });
   if (membrane_) membrane_->add_gradient(stretched_c_, workers_, result);
+}
+
+void CellPass::turning_forces(const Points& before, const Points& now, double share,
+                              const std::vector<double>& c, double scale, Points& forces) {
+  const OngoingMotion motion{before.data(), now.data(), share};
+  workers_.for_chunks(c_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    turn_blocks(blocks_, begin / kLanes, (end + kLanes - 1) / kLanes, motion, state_);
+  });
+  forces.resize(shape_->vertex_count(), 3);
+  workers_.for_chunks(c_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    gradient_of_blocks(blocks_, begin / kLanes, (end + kLanes - 1) / kLanes, state_, c.data(), forces.data());
+    for (std::size_t i = 3 * begin; i < 3 * end; ++i) forces.data()[i] *= scale;
+  });
 }
 
 /// Most methods need no rotations. The others have the last x evaluated again, which changes nothing else.

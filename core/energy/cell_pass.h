@@ -53,6 +53,14 @@ class CellPass {
   double sum(const LpNorm& norm) const;
   /// The gradient at the x, norm and rotations of the last evaluation.
   void gradient(Points& result) const;
+  /// The forces on a surface that goes on with its last move, from `before` to `now`, by the factor `share`: minus the gradient of
+  ///
+  ///   scale sum_i c_i sum_{j in N(i)} w_ij |y_ij - T_i e_ij|^2
+  ///
+  /// at y_ij = e_ij + share (e_ij - b_ij), with b_ij, e_ij and T_i of turn_blocks(). The solve in a metric of these weights then turns
+  /// each edge on. gradient() needs another evaluation afterwards.
+  void turning_forces(const Points& before, const Points& now, double share, const std::vector<double>& c,
+                      double scale, Points& forces);
 
   // Of the last evaluation.
   const std::vector<double>& squared_energies() const { return state_.squared; }  // E_i^2

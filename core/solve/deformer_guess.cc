@@ -4,8 +4,6 @@
 #include <optional>
 #include <utility>
 
-#include "core/solve/turns.h"
-
 namespace lpdeform {
 namespace {
 
@@ -151,7 +149,7 @@ bool Deformer::Impl::is_at_targets(const Points& from) const {
 /// guess alone that was close, or after a move with time for iterations. Turning takes longer, and leaves a surface that is behind as far
 /// behind. Straight lines also take on what the last iterations have corrected. If the handles move in another way, their displacement is
 /// extended harmonically, with `forces`, those of soft targets, or null.
-Points Deformer::Impl::continued(const Points* forces) const {
+Points Deformer::Impl::continued(const Points* forces) {
   if (x_before_move.rows() != x.rows()) return fitted(x, forces);
   const auto last = [this](Eigen::Index i) -> Eigen::RowVector3d { return x.row(i) - x_before_move.row(i); };
   double along = 0, size = 0, left = 0, longest = 0;
@@ -171,8 +169,8 @@ Points Deformer::Impl::continued(const Points* forces) const {
   const bool turns_on =
       !CoarseLevel::can_lead(*shape, least_bending()) || is_close || fine_iterations >= kTimeToTurn;
   if (!turns_on) return fitted(moved, nullptr);
-  const Points turning =
-      metric.turning_forces(x, moved, turns_between(*shape, x_before_move, x, share, workers()), workers());
+  Points turning;
+  objective.turning_forces(x_before_move, x, share, metric.relative_cell_weights(), metric.scale(), turning);
   return fitted(moved, &turning);  // soft targets move with the drag
 }
 

@@ -57,7 +57,7 @@ struct Deformer::Impl {
 
   Points laplacian_guess();
   Points fitted(const Points& moved, const Points* forces) const;
-  Points continued(const Points* forces) const;
+  Points continued(const Points* forces);
   std::optional<Points> guess_alone();
   Points current_guess();
   std::optional<Points> led_guess();

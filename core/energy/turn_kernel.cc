@@ -1,0 +1,130 @@
+#include "core/energy/turn_kernel.h"
+
+// This file is compiled once for each instruction set. The first call decides which version runs.
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+#ifdef __aarch64__  // once: Arm's sets of fixed width do the same here, and vectors of SVE can be no members
+#define HWY_COMPILE_ONLY_STATIC
+#endif
+#define HWY_TARGET_INCLUDE "core/energy/turn_kernel.cc"
+#include <hwy/foreach_target.h>
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "core/energy/rotation_lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace lpdeform::HWY_NAMESPACE {
+
+/// Added to the matrix of the least squares, as a share of its trace: edges that lie nearly along a line tell nothing about a turn
+/// around it.
+constexpr double kDamping = 1e-6;
+/// Of half the angle. Where edges turn round, their means tend to zero, and the axis is lost in rounding.
+constexpr double kMostTangent = 1;
+constexpr std::size_t kTurningEdge = 6 * kLanes;  // numbers of a slot in the buffer of edges: e, then b
+
+HWY_INLINE Vector cross(const Vector& a, const Vector& b) {
+  return {hn::MulSub(a.y, b.z, hn::Mul(a.z, b.y)), hn::MulSub(a.z, b.x, hn::Mul(a.x, b.z)),
+          hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x))};
+}
+
+HWY_INLINE Vector scaled(V s, const Vector& a) {
+  return {hn::Mul(s, a.x), hn::Mul(s, a.y), hn::Mul(s, a.z)};
+}
+
+/// Writes the edges of the lanes from `lane` on to `edges`, as [slot][state][axis][lane].
+HWY_INLINE void gather_edges(const CellBlocks& blocks, std::size_t block, std::size_t lane,
+                             const OngoingMotion& motion, double* edges) {
+  std::int32_t cells[kLanes];
+  for (std::size_t k = 0; k < hn::Lanes(D()); ++k)
+    cells[k] = std::max(blocks.cells[block * kLanes + lane + k], 0);
+  const Vector now = gather_packed(motion.now, cells), before = gather_packed(motion.before, cells);
+  for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1];
+       ++slot, edges += kTurningEdge) {
+    const std::int32_t* const neighbours = blocks.neighbour.data() + slot * kLanes + lane;
+    store(difference(now, gather_packed(motion.now, neighbours)), edges + lane);
+    store(difference(before, gather_packed(motion.before, neighbours)), edges + 3 * kLanes + lane);
+  }
+}
+
+/// v_i / 2 of the lanes from `lane` on.
+HWY_INLINE Vector half_turns(const CellBlocks& blocks, std::size_t block, std::size_t lane,
+                             const double* edges) {
+  const D d;
+  V xx = hn::Zero(d), xy = hn::Zero(d), xz = hn::Zero(d), yy = hn::Zero(d), yz = hn::Zero(d),
+    zz = hn::Zero(d);                                    // 4 times the sum of w m m^T
+  Vector moment{hn::Zero(d), hn::Zero(d), hn::Zero(d)};  // 2 times the sum of w m x d
+  for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1];
+       ++slot, edges += kTurningEdge) {
+    const Vector e = load(edges + lane), b = load(edges + 3 * kLanes + lane);
+    const V w = hn::LoadU(d, blocks.weight.data() + slot * kLanes + lane);
+    const Vector m{hn::Add(e.x, b.x), hn::Add(e.y, b.y), hn::Add(e.z, b.z)}, wm = scaled(w, m);
+    const Vector turning = cross(wm, difference(e, b));
+    xx = hn::MulAdd(wm.x, m.x, xx), xy = hn::MulAdd(wm.x, m.y, xy), xz = hn::MulAdd(wm.x, m.z, xz);
+    yy = hn::MulAdd(wm.y, m.y, yy), yz = hn::MulAdd(wm.y, m.z, yz), zz = hn::MulAdd(wm.z, m.z, zz);
+    moment = {hn::Add(moment.x, turning.x), hn::Add(moment.y, turning.y), hn::Add(moment.z, turning.z)};
+  }
+  // The matrix over its trace, damped: (1 + kDamping) I - sum of w m m^T / trace.
+  const V trace = hn::Add(xx, hn::Add(yy, zz)), one = hn::Set(d, 1 + kDamping);
+  const V over = hn::IfThenElseZero(hn::Gt(trace, hn::Zero(d)), hn::Div(hn::Set(d, 1.0), trace));
+  const V a = hn::NegMulAdd(over, xx, one), b = hn::NegMulAdd(over, yy, one),
+          c = hn::NegMulAdd(over, zz, one);
+  const V xy_ = hn::Neg(hn::Mul(over, xy)), xz_ = hn::Neg(hn::Mul(over, xz)),
+          yz_ = hn::Neg(hn::Mul(over, yz));
+  // Cramer's rule.
+  const Vector first{hn::NegMulAdd(yz_, yz_, hn::Mul(b, c)), hn::MulSub(xz_, yz_, hn::Mul(xy_, c)),
+                     hn::MulSub(xy_, yz_, hn::Mul(xz_, b))};
+  const V second_y = hn::NegMulAdd(xz_, xz_, hn::Mul(a, c)), second_z = hn::MulSub(xy_, xz_, hn::Mul(a, yz_)),
+          third_z = hn::NegMulAdd(xy_, xy_, hn::Mul(a, b));
+  const V determinant = dot({a, xy_, xz_}, first);
+  const Vector half =
+      scaled(hn::Div(over, determinant), {dot(first, moment), dot({first.y, second_y, second_z}, moment),
+                                          dot({first.z, second_z, third_z}, moment)});
+  const M is_known = hn::Le(dot(half, half), hn::Set(d, kMostTangent * kMostTangent));
+  return {hn::IfThenElseZero(is_known, half.x), hn::IfThenElseZero(is_known, half.y),
+          hn::IfThenElseZero(is_known, half.z)};
+}
+
+void TurnBlocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const OngoingMotion& motion,
+                BlockState& state) {
+  const D d;
+  const V share = hn::Set(d, motion.share), one = hn::Set(d, 1.0);
+  std::vector<double> edges(blocks.most_slots * kTurningEdge);
+  for (std::size_t block = first; block < last; ++block) {
+    for (std::size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+      gather_edges(blocks, block, lane, motion, edges.data());
+      const Vector t = scaled(share, half_turns(blocks, block, lane, edges.data()));
+      const V a = hn::Div(hn::Set(d, 2.0), hn::Add(one, dot(t, t)));
+      const double* edge = edges.data();
+      for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1];
+           ++slot, edge += kTurningEdge) {
+        const Vector e = load(edge + lane),
+                     straight = scaled(share, difference(e, load(edge + 3 * kLanes + lane)));
+        const Vector across = cross(t, e), inwards = cross(t, across);
+        const V w = hn::LoadU(d, blocks.weight.data() + slot * kLanes + lane);
+        const auto residual = [&](V c, V i, V s) { return hn::Mul(w, hn::MulSub(a, hn::Add(c, i), s)); };
+        const Vector r{residual(across.x, inwards.x, straight.x), residual(across.y, inwards.y, straight.y),
+                       residual(across.z, inwards.z, straight.z)};
+        store_packed(r, state.residuals.data() + (slot * kLanes + lane) * 3);
+      }
+    }
+  }
+}
+
+}  // namespace lpdeform::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace lpdeform {
+
+HWY_EXPORT(TurnBlocks);
+
+void turn_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const OngoingMotion& motion,
+                 BlockState& state) {
+  HWY_DYNAMIC_DISPATCH(TurnBlocks)(blocks, first, last, motion, state);
+}
+
+}  // namespace lpdeform
+#endif
