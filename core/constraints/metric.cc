@@ -176,30 +176,6 @@ void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& 
   }
 }
 
-Points Metric::turning_forces(const Points& from, const Points& to, const std::vector<Turn>& turns,
-                              const Workers& workers) const {
-  Points forces(from.rows(), 3);
-  const auto at = [&](std::int32_t i) {
-    using Row = Eigen::RowVector3d;
-    Row edges = Row::Zero(), turned = Row::Zero(), wanted = Row::Zero();
-    const Row own = from.row(i), own_to = to.row(i);
-    for (std::int32_t k = shape_->offsets()[i]; k < shape_->offsets()[i + 1]; ++k) {
-      const std::int32_t j = shape_->neighbours()[k];
-      const double weight = edge_weight(i, k);
-      const Row edge = weight * (own - from.row(j));
-      edges += edge;
-      turned += edge * turns[j].cast<double>();
-      wanted += weight * (own_to - to.row(j));
-    }
-    forces.row(i) = scale_ * (0.5 * (edges * turns[i].cast<double>() + turned) - wanted);
-  };
-  workers.for_chunks(
-      static_cast<std::size_t>(from.rows()), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
-        for (auto i = static_cast<std::int32_t>(begin); i < static_cast<std::int32_t>(end); ++i) at(i);
-      });
-  return forces;
-}
-
 /// x = matrix_^-1 b, x not b, by refinement from single precision. False if that does not converge.
 bool Metric::refine(const Points& b, Points& x, const Workers& workers) const {
   need_matrix();

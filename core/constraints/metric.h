@@ -21,9 +21,6 @@ struct MatrixEntry {
   bool operator==(const MatrixEntry&) const = default;
 };
 
-/// A linear map of directions: a row vector d becomes d T.
-using Turn = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
-
 /// The Hessian of the objective with rotations and cell weights c held fixed, on the free vertices: a reweighted
 /// Laplacian
 ///
@@ -84,14 +81,6 @@ class Metric {
   /// null, it also pulls at the free vertices: the entries count as well, and <forces, u> is subtracted from the sum.
   void extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
               const Points* forces = nullptr) const;
-
-  /// The forces, as extend() takes them, that turn the edges of `from` and leave those of `to` as they then are:
-  ///
-  ///   sum over j of W_ij ((from_i - from_j) (T_i + T_j) / 2 - (to_i - to_j))    at vertex i, W_ij = 2 (c_i + c_j) w_ij
-  ///
-  /// T is `turns`. The same bits on any number of threads.
-  Points turning_forces(const Points& from, const Points& to, const std::vector<Turn>& turns,
-                        const Workers& workers) const;
 
   /// c_i as factored, clipped.
   double cell_weight(std::int32_t i) const { return scale_ * cell_weights_[i]; }

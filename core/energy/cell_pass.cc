@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <numeric>
 
-#include "core/energy/turn_kernel.h"
-
 namespace lpdeform {
 namespace {
 
@@ -124,9 +122,9 @@ void CellPass::gradient(Points& result) const {
   if (membrane_) membrane_->add_gradient(stretched_c_, workers_, result);
 }
 
-void CellPass::turning_forces(const Points& before, const Points& now, double share,
-                              const std::vector<double>& c, double scale, Points& forces) {
-  const OngoingMotion motion{before.data(), now.data(), share};
+template <typename Motion>
+void CellPass::find_turning_forces(const Motion& motion, const std::vector<double>& c, double scale,
+                                   Points& forces) {
   workers_.for_chunks(c_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     turn_blocks(blocks_, begin / kLanes, (end + kLanes - 1) / kLanes, motion, state_);
   });
@@ -135,6 +133,16 @@ void CellPass::turning_forces(const Points& before, const Points& now, double sh
     gradient_of_blocks(blocks_, begin / kLanes, (end + kLanes - 1) / kLanes, state_, c.data(), forces.data());
     for (std::size_t i = 3 * begin; i < 3 * end; ++i) forces.data()[i] *= scale;
   });
+}
+
+void CellPass::turning_forces(const OngoingMotion& motion, const std::vector<double>& c, double scale,
+                              Points& forces) {
+  find_turning_forces(motion, c, scale, forces);
+}
+
+void CellPass::turning_forces(const TurnedMotion& motion, const std::vector<double>& c, double scale,
+                              Points& forces) {
+  find_turning_forces(motion, c, scale, forces);
 }
 
 /// Most methods need no rotations. The others have the last x evaluated again, which changes nothing else.

@@ -10,6 +10,7 @@
 #include "core/energy/lp_norm.h"
 #include "core/energy/membrane.h"
 #include "core/energy/rest_shape.h"
+#include "core/energy/turn_kernel.h"
 
 namespace lpdeform {
 
@@ -53,14 +54,15 @@ class CellPass {
   double sum(const LpNorm& norm) const;
   /// The gradient at the x, norm and rotations of the last evaluation.
   void gradient(Points& result) const;
-  /// The forces on a surface that goes on with its last move, from `before` to `now`, by the factor `share`: minus the gradient of
+  /// The forces on the surface where a motion ends that turn its edges: minus the gradient of
   ///
   ///   scale sum_i c_i sum_{j in N(i)} w_ij |y_ij - T_i e_ij|^2
   ///
-  /// at y_ij = e_ij + share (e_ij - b_ij), with b_ij, e_ij and T_i of turn_blocks(). The solve in a metric of these weights then turns
-  /// each edge on. gradient() needs another evaluation afterwards.
-  void turning_forces(const Points& before, const Points& now, double share, const std::vector<double>& c,
-                      double scale, Points& forces);
+  /// for the edges y_ij, which are where the motion ends; for them, e_ij and T_i see turn_blocks(). A solve in the metric of these c_i
+  /// then fits the turned edges together (Metric::extend). gradient() needs another evaluation afterwards.
+  void turning_forces(const OngoingMotion& motion, const std::vector<double>& c, double scale,
+                      Points& forces);
+  void turning_forces(const TurnedMotion& motion, const std::vector<double>& c, double scale, Points& forces);
 
   // Of the last evaluation.
   const std::vector<double>& squared_energies() const { return state_.squared; }  // E_i^2
@@ -80,6 +82,8 @@ class CellPass {
   void replace_bending(std::size_t begin, std::size_t end) const;
   double evaluate_cells(const Points& x, const LpNorm& norm, bool fit);
   void keep_rotations() const;
+  template <typename Motion>
+  void find_turning_forces(const Motion& motion, const std::vector<double>& c, double scale, Points& forces);
 
   std::shared_ptr<const RestShape> shape_;
   Workers workers_;

@@ -30,22 +30,26 @@ HWY_INLINE Vector cross(const Vector& a, const Vector& b) {
           hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x))};
 }
 
+HWY_INLINE Vector sum(const Vector& a, const Vector& b) {
+  return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+
 HWY_INLINE Vector scaled(V s, const Vector& a) {
   return {hn::Mul(s, a.x), hn::Mul(s, a.y), hn::Mul(s, a.z)};
 }
 
-/// Writes the edges of the lanes from `lane` on to `edges`, as [slot][state][axis][lane].
-HWY_INLINE void gather_edges(const CellBlocks& blocks, std::size_t block, std::size_t lane,
-                             const OngoingMotion& motion, double* edges) {
+/// Writes the edges of the lanes from `lane` on at both positions to `edges`, as [slot][position][axis][lane].
+HWY_INLINE void gather_edges(const CellBlocks& blocks, std::size_t block, std::size_t lane, const double* one,
+                             const double* other, double* edges) {
   std::int32_t cells[kLanes];
   for (std::size_t k = 0; k < hn::Lanes(D()); ++k)
     cells[k] = std::max(blocks.cells[block * kLanes + lane + k], 0);
-  const Vector now = gather_packed(motion.now, cells), before = gather_packed(motion.before, cells);
+  const Vector centre = gather_packed(one, cells), other_centre = gather_packed(other, cells);
   for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1];
        ++slot, edges += kTurningEdge) {
     const std::int32_t* const neighbours = blocks.neighbour.data() + slot * kLanes + lane;
-    store(difference(now, gather_packed(motion.now, neighbours)), edges + lane);
-    store(difference(before, gather_packed(motion.before, neighbours)), edges + 3 * kLanes + lane);
+    store(difference(centre, gather_packed(one, neighbours)), edges + lane);
+    store(difference(other_centre, gather_packed(other, neighbours)), edges + 3 * kLanes + lane);
   }
 }
 
@@ -60,11 +64,10 @@ HWY_INLINE Vector half_turns(const CellBlocks& blocks, std::size_t block, std::s
        ++slot, edges += kTurningEdge) {
     const Vector e = load(edges + lane), b = load(edges + 3 * kLanes + lane);
     const V w = hn::LoadU(d, blocks.weight.data() + slot * kLanes + lane);
-    const Vector m{hn::Add(e.x, b.x), hn::Add(e.y, b.y), hn::Add(e.z, b.z)}, wm = scaled(w, m);
-    const Vector turning = cross(wm, difference(e, b));
+    const Vector m = sum(e, b), wm = scaled(w, m);
     xx = hn::MulAdd(wm.x, m.x, xx), xy = hn::MulAdd(wm.x, m.y, xy), xz = hn::MulAdd(wm.x, m.z, xz);
     yy = hn::MulAdd(wm.y, m.y, yy), yz = hn::MulAdd(wm.y, m.z, yz), zz = hn::MulAdd(wm.z, m.z, zz);
-    moment = {hn::Add(moment.x, turning.x), hn::Add(moment.y, turning.y), hn::Add(moment.z, turning.z)};
+    moment = sum(moment, cross(wm, difference(e, b)));
   }
   // The matrix over its trace, damped: (1 + kDamping) I - sum of w m m^T / trace.
   const V trace = hn::Add(xx, hn::Add(yy, zz)), one = hn::Set(d, 1 + kDamping);
@@ -87,28 +90,52 @@ HWY_INLINE Vector half_turns(const CellBlocks& blocks, std::size_t block, std::s
           hn::IfThenElseZero(is_known, half.z)};
 }
 
-void TurnBlocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const OngoingMotion& motion,
-                BlockState& state) {
+/// Stores w_ij residual(e, other edge) of all edges of the lanes from `lane` on.
+template <typename Residual>
+HWY_INLINE void store_residuals(const CellBlocks& blocks, std::size_t block, std::size_t lane,
+                                const double* edges, const Residual& residual, BlockState& state) {
+  for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1];
+       ++slot, edges += kTurningEdge) {
+    const V w = hn::LoadU(D(), blocks.weight.data() + slot * kLanes + lane);
+    const Vector r = scaled(w, residual(load(edges + lane), load(edges + 3 * kLanes + lane)));
+    store_packed(r, state.residuals.data() + (slot * kLanes + lane) * 3);
+  }
+}
+
+void TurnOn(const CellBlocks& blocks, std::size_t first, std::size_t last, const OngoingMotion& motion,
+            BlockState& state) {
   const D d;
   const V share = hn::Set(d, motion.share), one = hn::Set(d, 1.0);
   std::vector<double> edges(blocks.most_slots * kTurningEdge);
   for (std::size_t block = first; block < last; ++block) {
     for (std::size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-      gather_edges(blocks, block, lane, motion, edges.data());
+      gather_edges(blocks, block, lane, motion.now, motion.before, edges.data());
       const Vector t = scaled(share, half_turns(blocks, block, lane, edges.data()));
       const V a = hn::Div(hn::Set(d, 2.0), hn::Add(one, dot(t, t)));
-      const double* edge = edges.data();
-      for (std::size_t slot = blocks.first_slot[block]; slot < blocks.first_slot[block + 1];
-           ++slot, edge += kTurningEdge) {
-        const Vector e = load(edge + lane),
-                     straight = scaled(share, difference(e, load(edge + 3 * kLanes + lane)));
-        const Vector across = cross(t, e), inwards = cross(t, across);
-        const V w = hn::LoadU(d, blocks.weight.data() + slot * kLanes + lane);
-        const auto residual = [&](V c, V i, V s) { return hn::Mul(w, hn::MulSub(a, hn::Add(c, i), s)); };
-        const Vector r{residual(across.x, inwards.x, straight.x), residual(across.y, inwards.y, straight.y),
-                       residual(across.z, inwards.z, straight.z)};
-        store_packed(r, state.residuals.data() + (slot * kLanes + lane) * 3);
-      }
+      const auto residual = [&](const Vector& e, const Vector& b) -> Vector {
+        const Vector across = cross(t, e), turn = sum(across, cross(t, across));  // T e = e + a turn
+        return difference(scaled(a, turn), scaled(share, difference(e, b)));
+      };
+      store_residuals(blocks, block, lane, edges.data(), residual, state);
+    }
+  }
+}
+
+void TurnTo(const CellBlocks& blocks, std::size_t first, std::size_t last, const TurnedMotion& motion,
+            BlockState& state) {
+  std::vector<double> edges(blocks.most_slots * kTurningEdge);
+  double turns[9 * kLanes];
+  for (std::size_t block = first; block < last; ++block) {
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      const auto cell = static_cast<std::size_t>(std::max(blocks.cells[block * kLanes + k], 0));
+      for (std::size_t e = 0; e < 9; ++e) turns[e * kLanes + k] = motion.turns[cell](e % 3, e / 3);
+    }
+    for (std::size_t lane = 0; lane < kLanes; lane += hn::Lanes(D())) {
+      gather_edges(blocks, block, lane, motion.from, motion.to, edges.data());
+      Matrix turn;
+      for (std::size_t e = 0; e < 9; ++e) turn.m[e / 3][e % 3] = hn::LoadU(D(), turns + e * kLanes + lane);
+      const auto residual = [&](const Vector& e, const Vector& y) { return difference(times(turn, e), y); };
+      store_residuals(blocks, block, lane, edges.data(), residual, state);
     }
   }
 }
@@ -119,11 +146,17 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace lpdeform {
 
-HWY_EXPORT(TurnBlocks);
+HWY_EXPORT(TurnOn);
+HWY_EXPORT(TurnTo);
 
 void turn_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const OngoingMotion& motion,
                  BlockState& state) {
-  HWY_DYNAMIC_DISPATCH(TurnBlocks)(blocks, first, last, motion, state);
+  HWY_DYNAMIC_DISPATCH(TurnOn)(blocks, first, last, motion, state);
+}
+
+void turn_blocks(const CellBlocks& blocks, std::size_t first, std::size_t last, const TurnedMotion& motion,
+                 BlockState& state) {
+  HWY_DYNAMIC_DISPATCH(TurnTo)(blocks, first, last, motion, state);
 }
 
 }  // namespace lpdeform

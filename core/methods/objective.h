@@ -31,9 +31,9 @@ class Objective {
   /// The gradient at the x, norm and rotations of the last evaluation.
   void gradient(Points& result) const;
   /// CellPass::turning_forces.
-  void turning_forces(const Points& before, const Points& now, double share, const std::vector<double>& c,
-                      double scale, Points& forces) {
-    cells_.turning_forces(before, now, share, c, scale, forces);
+  template <typename Motion>
+  void turning_forces(const Motion& motion, const std::vector<double>& c, double scale, Points& forces) {
+    cells_.turning_forces(motion, c, scale, forces);
   }
 
   /// The cells' part and the soft terms' part of the last evaluation.

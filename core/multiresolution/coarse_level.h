@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "core/constraints/constraints.h"
-#include "core/constraints/metric.h"
 #include "core/energy/material.h"
 #include "core/energy/rest_shape.h"
+#include "core/energy/turn_kernel.h"
 #include "core/mesh/coarsen.h"
 #include "core/multiresolution/level_solver.h"
 

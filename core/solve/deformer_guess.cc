@@ -66,6 +66,14 @@ Points Deformer::Impl::fitted(const Points& moved, const Points* forces) const {
   return u;
 }
 
+/// The forces that turn the edges of a motion, as Metric::extend() takes them.
+template <typename Motion>
+Points Deformer::Impl::turning_forces(const Motion& motion) {
+  Points forces;
+  objective.turning_forces(motion, metric.relative_cell_weights(), metric.scale(), forces);
+  return forces;
+}
+
 /// A drag that the coarse level leads: it goes to the handles first, and the surface goes with it. Each edge turns as the surface
 /// around it does, and one solve in the metric fits the edges together between the handles.
 std::optional<Points> Deformer::Impl::led_guess() {
@@ -76,7 +84,7 @@ std::optional<Points> Deformer::Impl::led_guess() {
       coarse->lead(coarse_inputs(effective_material()), is_ahead ? nullptr : &x, workers(), stop);
   if (!motion) return std::nullopt;
   const Points& moved = motion->positions;
-  const Points forces = metric.turning_forces(from, moved, motion->turns, workers());
+  const Points forces = turning_forces(TurnedMotion{from.data(), moved.data(), motion->turns.data()});
   lead = Lead::kTogether;
   return fitted(moved, &forces);
 }
@@ -169,8 +177,7 @@ Points Deformer::Impl::continued(const Points* forces) {
   const bool turns_on =
       !CoarseLevel::can_lead(*shape, least_bending()) || is_close || fine_iterations >= kTimeToTurn;
   if (!turns_on) return fitted(moved, nullptr);
-  Points turning;
-  objective.turning_forces(x_before_move, x, share, metric.relative_cell_weights(), metric.scale(), turning);
+  const Points turning = turning_forces(OngoingMotion{x_before_move.data(), x.data(), share});
   return fitted(moved, &turning);  // soft targets move with the drag
 }
 

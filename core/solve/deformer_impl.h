@@ -57,6 +57,8 @@ struct Deformer::Impl {
 
   Points laplacian_guess();
   Points fitted(const Points& moved, const Points* forces) const;
+  template <typename Motion>
+  Points turning_forces(const Motion& motion);
   Points continued(const Points* forces);
   std::optional<Points> guess_alone();
   Points current_guess();

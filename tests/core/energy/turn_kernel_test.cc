@@ -32,7 +32,7 @@ std::vector<TurnedEdge> turned_edges(const RestShape& shape, const Points& befor
                                      double share) {
   const CellBlocks blocks(shape, CellPass::kChunk);
   BlockState state(blocks);
-  turn_blocks(blocks, 0, blocks.block_count(), {before.data(), now.data(), share}, state);
+  turn_blocks(blocks, 0, blocks.block_count(), OngoingMotion{before.data(), now.data(), share}, state);
   std::vector<TurnedEdge> result;
   for (std::size_t k = 0; k < blocks.cells.size(); ++k) {
     const std::int32_t i = blocks.cells[k];
@@ -174,6 +174,36 @@ TEST_F(Turns, WhereNothingOrOnlyALineIsLeftThereIsATurnThatIsFinite) {
     EXPECT_NEAR(at.turned.norm(), at.edge.norm(), 1e-5 * at.edge.norm());
 }
 
+/// Of any linear maps.
+TEST_F(Turns, ThatAreGivenAreTaken) {
+  const Points to = shaken_and_moved(0.7);
+  std::vector<Turn> turns(static_cast<std::size_t>(to.rows()));
+  for (std::size_t i = 0; i < turns.size(); ++i) {
+    for (int e = 0; e < 9; ++e) turns[i](e / 3, e % 3) = std::sin(static_cast<float>(10 * i + e + 1));
+  }
+  const CellBlocks blocks(*shape, CellPass::kChunk);
+  BlockState state(blocks);
+  turn_blocks(blocks, 0, blocks.block_count(), TurnedMotion{mesh.vertices.data(), to.data(), turns.data()},
+              state);
+  std::size_t seen = 0;
+  for (std::size_t k = 0; k < blocks.cells.size(); ++k) {
+    const std::int32_t i = blocks.cells[k];
+    if (i < 0) continue;
+    for (std::size_t slot = blocks.first_slot[k / kLanes]; slot < blocks.first_slot[k / kLanes + 1]; ++slot) {
+      const std::size_t at = slot * kLanes + k % kLanes;
+      const std::int32_t j = blocks.neighbour[at];
+      const Eigen::RowVector3d e = mesh.vertices.row(i) - mesh.vertices.row(j), y = to.row(i) - to.row(j);
+      const Eigen::RowVector3d r =
+          blocks.weight[at] * (e * turns[static_cast<std::size_t>(i)].cast<double>() - y);
+      EXPECT_LE(
+          (Eigen::Map<const Eigen::RowVector3f>(state.residuals.data() + 3 * at).cast<double>() - r).norm(),
+          1e-6 * (1 + r.norm()));
+      seen += r.norm() > 0.01;
+    }
+  }
+  EXPECT_GE(seen, shape->neighbours().size() / 2);
+}
+
 /// Also of a mesh whose cells have between 3 and 12 neighbours, so that lanes and slots stay unused.
 TEST(TurningForces, AreThoseOfTheCellsAtBothEndsOfAnEdge) {
   for (const TriangleMesh& mesh : {grid(9, 7, 2), creature(24), box_surface(2, 2, 3)}) {
@@ -191,7 +221,7 @@ TEST(TurningForces, AreThoseOfTheCellsAtBothEndsOfAnEdge) {
       expected.row(at.i) += pull, expected.row(at.j) -= pull;
     }
     CellPass cells(shape, Workers(1));
-    cells.turning_forces(before, now, share, c, scale, forces);
+    cells.turning_forces(OngoingMotion{before.data(), now.data(), share}, c, scale, forces);
     EXPECT_LE((forces - expected).norm(), 1e-6 * expected.norm());
     EXPECT_GT(expected.norm(), 0);
   }
@@ -203,9 +233,10 @@ TEST(TurningForces, AreTheSameBitsOnAnyNumberOfThreads) {
   Points now = before, one, other;
   now.col(2) += 0.5 * before.col(0).cwiseAbs2();
   const std::vector<double> c(static_cast<std::size_t>(shape->vertex_count()), 0.5);
-  CellPass(shape, Workers(1)).turning_forces(before, now, 1.2, c, 1, one);
+  const OngoingMotion motion{before.data(), now.data(), 1.2};
+  CellPass(shape, Workers(1)).turning_forces(motion, c, 1, one);
   for (const int threads : {2, 3, 7}) {
-    CellPass(shape, Workers(threads)).turning_forces(before, now, 1.2, c, 1, other);
+    CellPass(shape, Workers(threads)).turning_forces(motion, c, 1, other);
     EXPECT_EQ(other, one) << threads;
   }
 }
@@ -219,7 +250,7 @@ TEST(TurningForces, ChangeNothingThatTheNextEvaluationDoesNotMake) {
   const double f = cells.evaluate(x, norm);
   EXPECT_EQ(alone.evaluate(x, norm), f);
   Points forces, gradient, expected;
-  cells.turning_forces(before, x, 1, cells.cell_weights(), 1, forces);
+  cells.turning_forces(OngoingMotion{before.data(), x.data(), 1}, cells.cell_weights(), 1, forces);
   EXPECT_EQ(cells.squared_energies(), alone.squared_energies());
   EXPECT_EQ(cells.cell_weights(), alone.cell_weights());
   EXPECT_EQ(cells.rotations(), alone.rotations());
