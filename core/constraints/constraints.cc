@@ -46,6 +46,7 @@ std::vector<char> movable_vertices(const RestShape& shape, const std::vector<std
   if (region != nullptr) {
     for (const std::int32_t vertex : *region) may_move[vertex] = true;
   }
+  if (shape.cell_count() == shape.vertex_count()) return may_move;
   for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
     if (shape.components()[i] < 0) may_move[i] = false;
   }
@@ -63,7 +64,9 @@ void drop_void_rows(const std::vector<char>& may_move, Holds& holds) {
 /// Holds all vertices outside the region at their positions in `outside`, and unreferenced vertices where handles have them or at rest.
 void hold_outside(const RestShape& shape, const std::vector<char>& may_move, const Points& outside,
                   std::vector<GivenPosition>& exact, Constraints& constraints) {
-  exact.reserve(exact.size() + static_cast<std::size_t>(std::count(may_move.begin(), may_move.end(), false)));
+  const auto count = static_cast<std::size_t>(std::count(may_move.begin(), may_move.end(), false));
+  if (count == 0) return;
+  exact.reserve(exact.size() + count);
   for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
     if (may_move[i]) continue;
     const bool has_handle = std::exchange(constraints.is_held[i], true);
@@ -76,16 +79,14 @@ void hold_outside(const RestShape& shape, const std::vector<char>& may_move, con
   }
 }
 
-/// Which components something ties, at least to the degree `least`.
+/// Which components something ties, at least to the degree `least`. `exact` has all vertices that are held.
 std::vector<char> tied_components(const RestShape& shape, const HandleSet& handles,
-                                  const Constraints& constraints, Tie least) {
+                                  const std::vector<GivenPosition>& exact, Tie least) {
   std::vector<char> is_tied(shape.component_count(), false);
   const auto tie = [&](std::int32_t vertex) {
     if (shape.components()[vertex] >= 0) is_tied[shape.components()[vertex]] = true;
   };
-  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
-    if (constraints.is_held[i]) tie(i);
-  }
+  for (const GivenPosition& held : exact) tie(held.vertex);
   for (const auto& [name, handle] : handles.handles()) {
     if (tie_of(handle.hold) < least) continue;
     for (std::size_t k = 0; k < handle.size(); ++k) tie(point_form(shape, handle, k).vertices[0]);
@@ -200,7 +201,7 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
   const std::vector<char> may_move = movable_vertices(shape, handles.region());
   hold_outside(shape, may_move, outside ? *outside : shape.positions(), exact, constraints);
   drop_void_rows(may_move, holds);
-  const std::vector<char> is_tied = tied_components(shape, handles, constraints, Tie::kPartial);
+  const std::vector<char> is_tied = tied_components(shape, handles, exact, Tie::kPartial);
   const auto free = std::find(is_tied.begin(), is_tied.end(), false);
   if (free != is_tied.end() && free_components == FreeComponents::kError) {
     return name_free_component(shape, static_cast<std::int32_t>(free - is_tied.begin()));
@@ -212,7 +213,7 @@ absl::StatusOr<Constraints> make_constraints(const RestShape& shape, const Handl
   auto linear = LinearConstraints::create(std::move(holds.rows), constraints.is_held);
   if (!linear.ok()) return linear.status();
   constraints.linear = *std::move(linear);
-  if (tied_components(shape, handles, constraints, Tie::kWhole) !=
+  if (tied_components(shape, handles, exact, Tie::kWhole) !=
       std::vector<char>(shape.component_count(), true)) {
     constraints.linear.tie_locks();
   }

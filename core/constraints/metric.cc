@@ -153,15 +153,9 @@ void Metric::adopt(const std::vector<double>& cell_weights) {
 }
 
 void Metric::extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
-                    const Points* forces) const {
-  Points b(u.rows(), 3);
-  const double over = 1 / scale_;
-  workers.for_chunks(static_cast<std::size_t>(u.size()), 3 * kChunk,
-                     [&](std::size_t, std::size_t begin, std::size_t end) {
-                       if (forces == nullptr) return void(std::fill(b.data() + begin, b.data() + end, 0.0));
-                       std::transform(forces->data() + begin, forces->data() + end, b.data() + begin,
-                                      [over](double force) { return over * force; });
-                     });
+                    Points forces) const {
+  Points b = std::move(forces);
+  if (b.size() == 0) b.setZero(u.rows(), 3);
   for (std::int32_t j = 0; j < shape_->vertex_count(); ++j) {
     if (!is_held[j]) continue;
     b.row(j) = u.row(j);

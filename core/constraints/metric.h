@@ -77,10 +77,9 @@ class Metric {
   void precondition(const Points& b, SinglePoints& x, const Workers& workers) const;
 
   /// Extends the displacements of held vertices (their rows of u) to the free ones: the minimiser of the sum over edges
-  /// of (c_i + c_j) w_ij |u_i - u_j|^2, to single precision. Rows of free vertices are overwritten. If `forces` is not
-  /// null, it also pulls at the free vertices: the entries count as well, and <forces, u> is subtracted from the sum.
-  void extend(const std::vector<char>& is_held, Points& u, const Workers& workers,
-              const Points* forces = nullptr) const;
+  /// of (c_i + c_j) w_ij |u_i - u_j|^2, to single precision. Rows of free vertices are overwritten. If `forces`, over scale(), are
+  /// not empty, they also pull at the free vertices: the entries count as well, and <forces, u> is subtracted from the sum.
+  void extend(const std::vector<char>& is_held, Points& u, const Workers& workers, Points forces = {}) const;
 
   /// c_i as factored, clipped.
   double cell_weight(std::int32_t i) const { return scale_ * cell_weights_[i]; }

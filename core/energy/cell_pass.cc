@@ -123,26 +123,22 @@ void CellPass::gradient(Points& result) const {
 }
 
 template <typename Motion>
-void CellPass::find_turning_forces(const Motion& motion, const std::vector<double>& c, double scale,
-                                   Points& forces) {
+void CellPass::find_turning_forces(const Motion& motion, const std::vector<double>& c, Points& forces) {
   workers_.for_chunks(c_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     turn_blocks(blocks_, begin / kLanes, (end + kLanes - 1) / kLanes, motion, state_);
   });
   forces.resize(shape_->vertex_count(), 3);
   workers_.for_chunks(c_.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     gradient_of_blocks(blocks_, begin / kLanes, (end + kLanes - 1) / kLanes, state_, c.data(), forces.data());
-    for (std::size_t i = 3 * begin; i < 3 * end; ++i) forces.data()[i] *= scale;
   });
 }
 
-void CellPass::turning_forces(const OngoingMotion& motion, const std::vector<double>& c, double scale,
-                              Points& forces) {
-  find_turning_forces(motion, c, scale, forces);
+void CellPass::turning_forces(const OngoingMotion& motion, const std::vector<double>& c, Points& forces) {
+  find_turning_forces(motion, c, forces);
 }
 
-void CellPass::turning_forces(const TurnedMotion& motion, const std::vector<double>& c, double scale,
-                              Points& forces) {
-  find_turning_forces(motion, c, scale, forces);
+void CellPass::turning_forces(const TurnedMotion& motion, const std::vector<double>& c, Points& forces) {
+  find_turning_forces(motion, c, forces);
 }
 
 /// Most methods need no rotations. The others have the last x evaluated again, which changes nothing else.

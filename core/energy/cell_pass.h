@@ -56,13 +56,12 @@ class CellPass {
   void gradient(Points& result) const;
   /// The forces on the surface where a motion ends that turn its edges: minus the gradient of
   ///
-  ///   scale sum_i c_i sum_{j in N(i)} w_ij |y_ij - T_i e_ij|^2
+  ///   sum_i c_i sum_{j in N(i)} w_ij |y_ij - T_i e_ij|^2
   ///
   /// for the edges y_ij, which are where the motion ends; for them, e_ij and T_i see turn_blocks(). A solve in the metric of these c_i
   /// then fits the turned edges together (Metric::extend). gradient() needs another evaluation afterwards.
-  void turning_forces(const OngoingMotion& motion, const std::vector<double>& c, double scale,
-                      Points& forces);
-  void turning_forces(const TurnedMotion& motion, const std::vector<double>& c, double scale, Points& forces);
+  void turning_forces(const OngoingMotion& motion, const std::vector<double>& c, Points& forces);
+  void turning_forces(const TurnedMotion& motion, const std::vector<double>& c, Points& forces);
 
   // Of the last evaluation.
   const std::vector<double>& squared_energies() const { return state_.squared; }  // E_i^2
@@ -83,7 +82,7 @@ class CellPass {
   double evaluate_cells(const Points& x, const LpNorm& norm, bool fit);
   void keep_rotations() const;
   template <typename Motion>
-  void find_turning_forces(const Motion& motion, const std::vector<double>& c, double scale, Points& forces);
+  void find_turning_forces(const Motion& motion, const std::vector<double>& c, Points& forces);
 
   std::shared_ptr<const RestShape> shape_;
   Workers workers_;

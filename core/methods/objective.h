@@ -32,8 +32,8 @@ class Objective {
   void gradient(Points& result) const;
   /// CellPass::turning_forces.
   template <typename Motion>
-  void turning_forces(const Motion& motion, const std::vector<double>& c, double scale, Points& forces) {
-    cells_.turning_forces(motion, c, scale, forces);
+  void turning_forces(const Motion& motion, const std::vector<double>& c, Points& forces) {
+    cells_.turning_forces(motion, c, forces);
   }
 
   /// The cells' part and the soft terms' part of the last evaluation.

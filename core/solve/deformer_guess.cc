@@ -46,17 +46,16 @@ Points Deformer::Impl::laplacian_guess() {
   Points u = constraints->targets - shape->scaled_positions();
   Points forces = Points::Zero(u.rows(), 3);
   guess_springs().add_gradient(forces);
-  forces = -forces;
-  metric.extend(constraints->is_held, u, workers(), &forces);
+  metric.extend(constraints->is_held, u, workers(), -forces / metric.scale());
   return shape->scaled_positions() + u;
 }
 
 /// The surface `moved`, fitted between the targets of held vertices in the metric, with `forces` as Metric::extend() takes them.
-Points Deformer::Impl::fitted(const Points& moved, const Points* forces) const {
+Points Deformer::Impl::fitted(const Points& moved, Points forces) const {
   Points u(moved.rows(), 3);
   for (const std::int32_t i : constraints->exact.vertices)
     u.row(i) = constraints->targets.row(i) - moved.row(i);
-  metric.extend(constraints->is_held, u, workers(), forces);
+  metric.extend(constraints->is_held, u, workers(), std::move(forces));
   for_rows(u, workers(), [&](Eigen::Index i) {
     if (constraints->is_held[i])
       u.row(i) = constraints->targets.row(i);
@@ -70,7 +69,7 @@ Points Deformer::Impl::fitted(const Points& moved, const Points* forces) const {
 template <typename Motion>
 Points Deformer::Impl::turning_forces(const Motion& motion) {
   Points forces;
-  objective.turning_forces(motion, metric.relative_cell_weights(), metric.scale(), forces);
+  objective.turning_forces(motion, metric.relative_cell_weights(), forces);
   return forces;
 }
 
@@ -84,9 +83,8 @@ std::optional<Points> Deformer::Impl::led_guess() {
       coarse->lead(coarse_inputs(effective_material()), is_ahead ? nullptr : &x, workers(), stop);
   if (!motion) return std::nullopt;
   const Points& moved = motion->positions;
-  const Points forces = turning_forces(TurnedMotion{from.data(), moved.data(), motion->turns.data()});
   lead = Lead::kTogether;
-  return fitted(moved, &forces);
+  return fitted(moved, turning_forces(TurnedMotion{from.data(), moved.data(), motion->turns.data()}));
 }
 
 /// Whether a led guess is not much worse than the other one: at p = 2 its E^(1/2) is at most kMostAbove times as high. It may be higher,
@@ -156,9 +154,9 @@ bool Deformer::Impl::is_at_targets(const Points& from) const {
 /// On straight lines the surface would be stretched by the square of the angle. Where coarse levels can lead, edges turn on only after a
 /// guess alone that was close, or after a move with time for iterations. Turning takes longer, and leaves a surface that is behind as far
 /// behind. Straight lines also take on what the last iterations have corrected. If the handles move in another way, their displacement is
-/// extended harmonically, with `forces`, those of soft targets, or null.
-Points Deformer::Impl::continued(const Points* forces) {
-  if (x_before_move.rows() != x.rows()) return fitted(x, forces);
+/// extended harmonically, with `forces`, those of soft targets, or empty.
+Points Deformer::Impl::continued(Points forces) {
+  if (x_before_move.rows() != x.rows()) return fitted(x, std::move(forces));
   const auto last = [this](Eigen::Index i) -> Eigen::RowVector3d { return x.row(i) - x_before_move.row(i); };
   double along = 0, size = 0, left = 0, longest = 0;
   for (const std::int32_t i : constraints->exact.vertices) {
@@ -171,14 +169,14 @@ Points Deformer::Impl::continued(const Points* forces) {
   const double share = size > 0 ? along / size : 0;
   const bool goes_on = share > 0 && share < kFarthestGuess && along * along > kSameWay * size * left &&
                        longest_move(x_before_move, x, workers()) < kSteady * longest;
-  if (!goes_on) return fitted(x, forces);
+  if (!goes_on) return fitted(x, std::move(forces));
   Points moved(x.rows(), 3);
   for_rows(moved, workers(), [&](Eigen::Index i) { moved.row(i) = x.row(i) + share * last(i); });
   const bool turns_on =
       !CoarseLevel::can_lead(*shape, least_bending()) || is_close || fine_iterations >= kTimeToTurn;
-  if (!turns_on) return fitted(moved, nullptr);
-  const Points turning = turning_forces(OngoingMotion{x_before_move.data(), x.data(), share});
-  return fitted(moved, &turning);  // soft targets move with the drag
+  if (!turns_on) return fitted(moved, {});
+  // Soft targets move with the drag.
+  return fitted(moved, turning_forces(OngoingMotion{x_before_move.data(), x.data(), share}));
 }
 
 /// The guess of a drag that the coarse levels do not lead. It takes half of the time. nullopt if it is not good enough: if its E^(1/2)
@@ -190,7 +188,7 @@ std::optional<Points> Deformer::Impl::guess_alone() {
       [&] {
         least = coarse->least_energy(coarse_inputs(effective_material()), InitialGuess::kCurrent, stop);
       },
-      [&] { guess = continued(nullptr); });
+      [&] { guess = continued({}); });
   if (!least || !guess.allFinite()) return std::nullopt;
   const double sum = objective.evaluate(guess, even_norm());
   const double over = over_least(*least);
@@ -203,13 +201,14 @@ std::optional<Points> Deformer::Impl::guess_alone() {
 
 /// The guess of a solve that goes on from x: by the fine level alone, where that is good enough, or led by the coarse levels.
 Points Deformer::Impl::current_guess() {
-  std::optional<Points> forces;
+  Points forces;
   const SoftTerms& before = objective.soft_terms();
   if (!constraints->soft.empty() && constraints->soft.has_rows_of(before)) {
     forces = Points::Zero(x.rows(), 3);
-    constraints->soft.add_pull(before, *forces);
+    constraints->soft.add_pull(before, forces);
+    forces /= metric.scale();
   }
-  if (is_at_targets(x) && (!forces || forces->isZero(0))) {
+  if (is_at_targets(x) && forces.isZero(0)) {
     lead = Lead::kNone;  // the fine level goes on alone
     begin_move();
     return x;
@@ -241,7 +240,7 @@ Points Deformer::Impl::current_guess() {
     begin_move();
     return go_with(*std::move(led));
   }
-  Points guess = continued(forces ? &*forces : nullptr);
+  Points guess = continued(std::move(forces));
   begin_move();
   if (!can_lead) return guess;
   if (!guess.allFinite()) {

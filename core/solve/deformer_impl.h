@@ -56,10 +56,10 @@ struct Deformer::Impl {
   double length_unit() const { return material.length_unit > 0 ? material.length_unit : unit(); }
 
   Points laplacian_guess();
-  Points fitted(const Points& moved, const Points* forces) const;
+  Points fitted(const Points& moved, Points forces) const;
   template <typename Motion>
   Points turning_forces(const Motion& motion);
-  Points continued(const Points* forces);
+  Points continued(Points forces);
   std::optional<Points> guess_alone();
   Points current_guess();
   std::optional<Points> led_guess();

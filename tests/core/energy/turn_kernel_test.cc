@@ -211,17 +211,17 @@ TEST(TurningForces, AreThoseOfTheCellsAtBothEndsOfAnEdge) {
     const Points before = shape->scaled_positions(), now = shaken(before, 0.2);
     std::vector<double> c(static_cast<std::size_t>(shape->vertex_count()));
     for (std::size_t i = 0; i < c.size(); ++i) c[i] = 0.1 + 0.01 * double(i % 97);
-    const double share = 0.8, scale = 1e30;
+    const double share = 0.8;
     Points expected = Points::Zero(now.rows(), 3), forces;
     for (const TurnedEdge& at : turned_edges(*shape, before, now, share)) {
       const Eigen::RowVector3d b = before.row(at.i) - before.row(at.j);
       const Eigen::RowVector3d pull =
-          2 * scale * c[static_cast<std::size_t>(at.i)] * at.weight *
+          2 * c[static_cast<std::size_t>(at.i)] * at.weight *
           (at.turned.transpose() - at.edge.transpose() - share * (at.edge.transpose() - b));
       expected.row(at.i) += pull, expected.row(at.j) -= pull;
     }
     CellPass cells(shape, Workers(1));
-    cells.turning_forces(OngoingMotion{before.data(), now.data(), share}, c, scale, forces);
+    cells.turning_forces(OngoingMotion{before.data(), now.data(), share}, c, forces);
     EXPECT_LE((forces - expected).norm(), 1e-6 * expected.norm());
     EXPECT_GT(expected.norm(), 0);
   }
@@ -234,9 +234,9 @@ TEST(TurningForces, AreTheSameBitsOnAnyNumberOfThreads) {
   now.col(2) += 0.5 * before.col(0).cwiseAbs2();
   const std::vector<double> c(static_cast<std::size_t>(shape->vertex_count()), 0.5);
   const OngoingMotion motion{before.data(), now.data(), 1.2};
-  CellPass(shape, Workers(1)).turning_forces(motion, c, 1, one);
+  CellPass(shape, Workers(1)).turning_forces(motion, c, one);
   for (const int threads : {2, 3, 7}) {
-    CellPass(shape, Workers(threads)).turning_forces(motion, c, 1, other);
+    CellPass(shape, Workers(threads)).turning_forces(motion, c, other);
     EXPECT_EQ(other, one) << threads;
   }
 }
@@ -250,7 +250,7 @@ TEST(TurningForces, ChangeNothingThatTheNextEvaluationDoesNotMake) {
   const double f = cells.evaluate(x, norm);
   EXPECT_EQ(alone.evaluate(x, norm), f);
   Points forces, gradient, expected;
-  cells.turning_forces(OngoingMotion{before.data(), x.data(), 1}, cells.cell_weights(), 1, forces);
+  cells.turning_forces(OngoingMotion{before.data(), x.data(), 1}, cells.cell_weights(), forces);
   EXPECT_EQ(cells.squared_energies(), alone.squared_energies());
   EXPECT_EQ(cells.cell_weights(), alone.cell_weights());
   EXPECT_EQ(cells.rotations(), alone.rotations());
