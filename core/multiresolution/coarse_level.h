@@ -66,6 +66,8 @@ class CoarseLevel {
   /// caller's units: at p = 2, about what the fine level's minimum has. The levels above stay where they are. nullopt if a level does
   /// not take the inputs, or if the lowest one makes no iteration.
   std::optional<double> least_energy(const FineInputs& fine, InitialGuess initial, std::stop_token stop);
+  /// E of the lowest level where it is: where the last lead() or least_energy() has come to. In the caller's units.
+  double lowest_energy() const { return has_level_below() ? solver_->lowest_energy() : solver_->energy(); }
   /// The fine level, which is at `x` (scaled units), goes on alone. The next lead() first moves the coarse levels as it has moved
   /// by then.
   void go_alone(const Points& x);

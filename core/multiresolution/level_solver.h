@@ -23,6 +23,7 @@ class LevelSolver {
   virtual void set_bending(const Field& shares) = 0;
   virtual void displace(const Points& by) = 0;
   virtual std::optional<double> least_energy(InitialGuess initial, std::stop_token stop) = 0;
+  virtual double lowest_energy() const = 0;
   virtual absl::Status set_handles(const HandleSet& handles) = 0;
   virtual absl::Status set_positions(const Points& positions) = 0;
   virtual absl::Status start(const SolveSettings& settings, std::stop_token stop) = 0;

@@ -157,6 +157,10 @@ void Deformer::displace(const Points& by) {
   self.x_before_move.resize(0, 3);
 }
 
+double Deformer::lowest_energy() const {
+  return impl_->coarse ? impl_->coarse->lowest_energy() : impl_->summary.energy;
+}
+
 std::optional<double> Deformer::least_energy(InitialGuess initial, std::stop_token stop) {
   Impl& self = *impl_;
   if (!self.constraints || !self.make_coarse()) return std::nullopt;

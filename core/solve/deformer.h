@@ -78,6 +78,8 @@ class Deformer {
   void displace(const Points& by);
   /// Only for coarse levels: CoarseLevel::least_energy() of the level below. nullopt if there is none.
   std::optional<double> least_energy(InitialGuess initial, std::stop_token stop);
+  /// Only for coarse levels: E of the lowest level where it is, which is this one if there is none below.
+  double lowest_energy() const;
 
   /// Begins a solve. Errors: FAILED_PRECONDITION (NO_HANDLES); INVALID_ARGUMENT (METHOD_NEEDS_P,
   /// METHOD_NEEDS_EXACT_HANDLES, TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE). `stop` is

@@ -1,6 +1,7 @@
 #include "core/solve/deformer_impl.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -15,6 +16,10 @@ constexpr double kMostAbove = 2;      // see is_good
 constexpr double kClose = 1.25;       // see is_close
 constexpr double kLittleAbove = 1.2;  // see is_as_good_as_before
 constexpr double kHardlyAbove = 1.1;  // see may_be_shown
+// A move of so many iterations had time. Where guesses can only be compared, the guess alone may then have kMostOverUsual times as much
+// of the lowest level's E^(1/p) as the state after that move; see most_over_least.
+constexpr int kTimeToGoAlone = 6;
+constexpr double kMostOverUsual = 1.05;
 // Moves that coarse levels lead after guess_alone has refused, and where there was no time for an iteration after a guess that was not close.
 constexpr int kMovesToLead = 3, kMovesToLeadWithoutTime = 12;
 // Where coarse levels can lead, edges turn on after a move of at least this many iterations; see continued.
@@ -179,9 +184,20 @@ Points Deformer::Impl::continued(Points forces) {
   return fitted(moved, turning_forces(OngoingMotion{x_before_move.data(), x.data(), share}));
 }
 
-/// The guess of a drag that the coarse levels do not lead. It takes half of the time. nullopt if it is not good enough: if its E^(1/2)
-/// is too far above that of the lowest level, which tells about what the minimum has.
-std::optional<Points> Deformer::Impl::guess_alone() {
+/// How many times the E^(1/p) of the lowest level the guess alone may have; 0 if the lowest level tells nothing. At p = 2 it tells about
+/// what the minimum has. At another p it may be far from it. But it changes with the handles in the same way, so that a guess can be
+/// compared with the state after a move that had time. It has to be asked for before the lowest level goes to the new handles.
+double Deformer::Impl::most_over_least() {
+  if (can_judge_guesses()) return kMostOverLeast;
+  if (!can_compare_guesses()) return 0;
+  if (fine_iterations >= kTimeToGoAlone)
+    usual_over_least = std::pow(energy_before / coarse->lowest_energy(), 1 / material.p(0));
+  return kMostOverUsual * usual_over_least.value_or(0);
+}
+
+/// The guess of a drag that the coarse levels do not lead. It takes half of the time. nullopt if it is not good enough: if its E^(1/p)
+/// is more than `most_over` times that of the lowest level.
+std::optional<Points> Deformer::Impl::guess_alone(double most_over) {
   std::optional<double> least;
   Points guess;
   workers().run_both(
@@ -192,10 +208,10 @@ std::optional<Points> Deformer::Impl::guess_alone() {
   if (!least || !guess.allFinite()) return std::nullopt;
   const double sum = objective.evaluate(guess, even_norm());
   const double over = over_least(*least);
-  if (!(over <= kMostOverLeast)) return std::nullopt;
-  is_close = over <= kClose;
+  if (!(over <= most_over)) return std::nullopt;
+  is_close = usual_over_least || over <= kClose;
   is_guess_evaluated = true;
-  is_guess_smooth = may_be_shown(sum);
+  is_guess_smooth = !usual_over_least && may_be_shown(sum);
   return guess;
 }
 
@@ -218,15 +234,18 @@ Points Deformer::Impl::current_guess() {
   if (had_no_time) moves_to_lead = kMovesToLeadWithoutTime;
   const bool is_to_lead = moves_to_lead > 0;
   if (is_to_lead) --moves_to_lead;
-  const bool is_to_judge = can_lead && lead == Lead::kTogether && can_judge_guesses() && !is_to_lead;
+  if (lead != Lead::kTogether || can_judge_guesses()) usual_over_least.reset();
+  const double most_over = can_lead && lead == Lead::kTogether && !is_to_lead ? most_over_least() : 0;
+  const bool is_to_judge = most_over > 0;
   if (is_to_judge) {
-    if (std::optional<Points> alone = guess_alone()) {
+    if (std::optional<Points> alone = guess_alone(most_over)) {
       coarse->go_alone(x);
       begin_move();
       goes_alone = true;
       return *std::move(alone);
     }
-    moves_to_lead = kMovesToLead;
+    if (can_judge_guesses()) moves_to_lead = kMovesToLead;
+    usual_over_least.reset();
   }
   is_close = false;
   std::optional<Points> led = can_lead ? led_guess() : std::nullopt;

@@ -195,6 +195,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   started = Clock::now();
   settings = new_settings;
   stop = std::move(new_stop);
+  energy_before = summary.energy;
   summary = {};
   summary.threads = workers().threads();
   lowest.reset();
@@ -209,6 +210,7 @@ void Deformer::Impl::begin(const SolveSettings& new_settings, std::stop_token ne
   if (!is_warm) {
     x_before_move.resize(0, 3);
     lead = Lead::kNone;
+    usual_over_least.reset();
   }
   if (!settings.effort) settings.effort = default_effort(is_warm);
   summary.effort = *settings.effort;

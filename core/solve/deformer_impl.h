@@ -60,7 +60,8 @@ struct Deformer::Impl {
   template <typename Motion>
   Points turning_forces(const Motion& motion);
   Points continued(Points forces);
-  std::optional<Points> guess_alone();
+  double most_over_least();
+  std::optional<Points> guess_alone(double most_over);
   Points current_guess();
   std::optional<Points> led_guess();
   void follow(const Points& guess);
@@ -84,6 +85,7 @@ struct Deformer::Impl {
   bool is_best_zero() const;
   Problem make_problem();
   bool can_judge_guesses() const;
+  bool can_compare_guesses() const;
   double over_least(double least) const;
   bool is_guess_good_enough() const;
   Method chosen_method(Method asked, bool is_warm);
@@ -201,6 +203,9 @@ struct Deformer::Impl {
   bool is_guess_smooth = false;  // see Deformer::is_guess_smooth()
   int moves_to_lead = 0;         // by the coarse levels, before guess_alone() is tried again
   int fine_iterations = 0;       // of the running solve
+  double energy_before = 0;      // E at the end of the solve before it
+  // E^(1/p) at the end of the last move that had time, over that of the lowest level; see can_compare_guesses().
+  std::optional<double> usual_over_least;
   std::unique_ptr<Minimiser> minimiser;
   std::unique_ptr<MinimaSearch> search;      // runs after the minimiser has ended
   bool is_search_apart = false;              // its result goes to `lowest`, not to x

@@ -21,6 +21,7 @@ constexpr std::int32_t kLargestSearchedLevel =
 // level is too large to be searched itself.
 constexpr double kLeastSavingOfLevel = 0.02;
 constexpr std::int32_t kNever = std::numeric_limits<std::int32_t>::max();  // vertices
+constexpr double kLeastPToCompare = 1.5;                                   // see can_compare_guesses
 constexpr double kWorthGoing = 32000;  // vertices; see is_guess_good_enough
 
 class DeformerOfLevel : public LevelSolver {
@@ -32,6 +33,7 @@ class DeformerOfLevel : public LevelSolver {
   std::optional<double> least_energy(InitialGuess initial, std::stop_token stop) override {
     return deformer_->least_energy(initial, std::move(stop));
   }
+  double lowest_energy() const override { return deformer_->lowest_energy(); }
   absl::Status set_material(const Material& material) override { return deformer_->set_material(material); }
   absl::Status set_handles(const HandleSet& handles) override { return deformer_->set_handles(handles); }
   absl::Status set_positions(const Points& positions) override { return deformer_->set_positions(positions); }
@@ -111,11 +113,17 @@ bool Deformer::Impl::can_judge_guesses() const {
          constraints->linear.empty() && CoarseLevel::can_lead(*shape, least_bending());
 }
 
-/// The E^(1/2) of the last evaluation of `objective` over that of the lowest level, at p = 2. Stiffness counts: where it is low, large E_i
-/// are no sign of a bad guess.
+/// Whether it does so compared with what it was after a move that had time: at a p below 2 that is not too near 1.
+bool Deformer::Impl::can_compare_guesses() const {
+  return !is_coarse() && material.p.size() == 1 && material.p(0) >= kLeastPToCompare && material.p(0) < 2 &&
+         constraints->soft.empty() && constraints->linear.empty();
+}
+
+/// The E^(1/p) of the last evaluation of `objective` over that of the lowest level, for one p. Stiffness counts: where it is low, large
+/// E_i are no sign of a bad guess.
 double Deformer::Impl::over_least(double least) const {
   const LpNorm weighted(effective_material(), shape->vertex_count(), unit(), 1);
-  return std::sqrt(weighted.true_energy(objective.sum(weighted)) / least);
+  return std::pow(weighted.true_energy(objective.sum(weighted)) / least, 1 / material.p(0));
 }
 
 /// Whether a cold solve does without a coarse level, because its guess, the last evaluation of `objective`, is good enough already. The

@@ -27,6 +27,7 @@ class KeepingSolver : public LevelSolver {
   std::optional<double> least_energy(InitialGuess /*initial*/, std::stop_token /*stop*/) override {
     return std::nullopt;
   }
+  double lowest_energy() const override { return 0; }
   absl::Status set_handles(const HandleSet& /*handles*/) override { return absl::OkStatus(); }
   absl::Status set_positions(const Points& positions) override {
     positions_ = positions;

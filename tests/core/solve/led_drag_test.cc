@@ -127,7 +127,45 @@ TEST_P(LedDragOfLowPTest, NoGuessIsSmoothOnceTheHandlesStay) {
   EXPECT_FALSE(live->is_guess_smooth());
 }
 
+/// At p = 2 it was 1.21 when guesses went along straight lines, and coarse levels led after a move without iterations.
+TEST_P(LedDragOfLowPTest, StaysNearWithoutIterationsOnceItIsNear) {
+  for (int number = 1; number < 8; ++number) (void)move(number, 20);
+  for (int number = 8; number < 11; ++number) (void)move(number, 0);
+  EXPECT_LE(above_minimum(move(11, 0)), GetParam() == 2 ? 1.1 : 1.2);
+}
+
+/// The coarse levels have stayed behind meanwhile, and have to be moved first. At p = 2 1.9 times the minimum, were they not.
+TEST_P(LedDragOfLowPTest, IsLedOnAfterMovesThatItMadeAlone) {
+  for (int number = 1; number <= 8; ++number) (void)move(number, 20);
+  for (int number = 12; number <= 24; number += 4) (void)move(number, 1);
+  EXPECT_LE(above_minimum(move(25)), 1.3);
+}
+
 INSTANTIATE_TEST_SUITE_P(LowNorms, LedDragOfLowPTest, testing::Values(1.5, 2.0));
+
+class LedDragAtOneAndAHalfTest : public LedDragTest {};
+
+/// Then the guess is the fine level's own, which is never shown before an iteration at p = 1.5.
+TEST_P(LedDragAtOneAndAHalfTest, GoesAloneAfterMovesThatHadTime) {
+  for (int number = 1; number < 10; ++number) (void)move(number, 2);
+  (void)move(10, 20);
+  EXPECT_TRUE(live->is_guess_smooth());
+  for (int number = 11; number < 16; ++number) {
+    (void)move(number, 6);
+    EXPECT_FALSE(live->is_guess_smooth()) << number;
+  }
+}
+
+/// What the surface had over the lowest level's energy at one p tells nothing at another one.
+TEST_P(LedDragAtOneAndAHalfTest, IsLedAgainAfterAChangeOfP) {
+  for (int number = 1; number < 10; ++number) (void)move(number, 20);
+  EXPECT_FALSE(live->is_guess_smooth());
+  ASSERT_TRUE(live->set_material(Material::uniform(1.6)).ok());
+  for (int number = 10; number < 16; ++number) (void)move(number, 2);
+  EXPECT_TRUE(live->is_guess_smooth());
+}
+
+INSTANTIATE_TEST_SUITE_P(AtOneAndAHalf, LedDragAtOneAndAHalfTest, testing::Values(1.5));
 
 class LedDragAtSixTest : public LedDragTest {};
 
@@ -143,13 +181,6 @@ TEST_P(LedDragAtSixTest, ItsFirstMovesHaveFewKinks) {
 INSTANTIATE_TEST_SUITE_P(AtSix, LedDragAtSixTest, testing::Values(6.0));
 
 class LedDragAtTwoTest : public LedDragTest {};
-
-/// It was 1.21 when guesses went along straight lines, and coarse levels led after a move without iterations.
-TEST_P(LedDragAtTwoTest, StaysNearWithoutIterationsOnceItIsNear) {
-  for (int number = 1; number < 8; ++number) (void)move(number, 20);
-  for (int number = 8; number < 11; ++number) (void)move(number, 0);
-  EXPECT_LE(above_minimum(move(11, 0)), 1.1);
-}
 
 /// Where E^(1/2) of the guess is at most a tenth above that of the state before. From the seventh to the eighth move that of the minimum
 /// rises by an eighth, and from the 13th on by less than a tenth.
@@ -179,13 +210,6 @@ TEST_P(LedDragAtTwoTest, ShowsNoGuessOfAMeshWithStiffParts) {
 TEST_P(LedDragAtTwoTest, IsAtTheMinimumWhereMovesHaveTimeForThreeIterations) {
   for (int number = 1; number < 12; ++number) (void)move(number, 3);
   EXPECT_LE(above_minimum(move(12, 3)), 1.1);
-}
-
-/// The coarse levels have stayed behind meanwhile, and have to be moved first. 1.9 times the minimum, were they not.
-TEST_P(LedDragAtTwoTest, IsLedOnAfterMovesThatItMadeAlone) {
-  for (int number = 1; number <= 8; ++number) (void)move(number, 20);
-  for (int number = 12; number <= 24; number += 4) (void)move(number, 1);
-  EXPECT_LE(above_minimum(move(25)), 1.3);
 }
 
 TEST_P(LedDragAtTwoTest, GivesTheSameBitsOnAnyNumberOfThreads) {
