@@ -97,7 +97,6 @@ class Metric {
   std::size_t memory_bytes() const;
 
  private:
-  static constexpr std::size_t kChunk = 4096;  // vertices
   static constexpr int kMostRaised = 10;
 
   /// A row of M / scale_.

@@ -21,7 +21,7 @@ struct BlockState {
   std::vector<double> squared;    // of each vertex: E_i^2
   std::vector<float>
       residuals;  // [slot][lane][axis], then a filler: r_ij = w_ij ((x_i - x_j) - R_i (p_i - p_j));
-  // single precision: a small relative error is harmless, and memory bandwidth is the bottleneck
+  // turn_blocks() stores others. Single precision: a small relative error is harmless, and memory bandwidth is the bottleneck
 };
 
 /// Computes rotations (Eq. 2, as fit_rotation does), squared energies and residuals of blocks first to last - 1 at

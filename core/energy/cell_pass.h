@@ -56,7 +56,7 @@ class CellPass {
   void gradient(Points& result) const;
   /// The forces on the surface where a motion ends that turn its edges: minus the gradient of
   ///
-  ///   sum_i c_i sum_{j in N(i)} w_ij |y_ij - T_i e_ij|^2
+  ///   sum_i c_i sum_{j in N(i)} w_ij |y_ij - e_ij T_i|^2
   ///
   /// for the edges y_ij, which are where the motion ends; for them, e_ij and T_i see turn_blocks(). A solve in the metric of these c_i
   /// then fits the turned edges together (Metric::extend). gradient() needs another evaluation afterwards.

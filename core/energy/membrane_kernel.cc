@@ -19,19 +19,10 @@ HWY_BEFORE_NAMESPACE();
 namespace lpdeform::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-HWY_INLINE Vector scaled(V factor, const Vector& a) {
-  return {hn::Mul(factor, a.x), hn::Mul(factor, a.y), hn::Mul(factor, a.z)};
-}
-
 HWY_INLINE Vector sum_of(V a_factor, const Vector& a, V b_factor, const Vector& b) {
   return {hn::MulAdd(a_factor, a.x, hn::Mul(b_factor, b.x)),
           hn::MulAdd(a_factor, a.y, hn::Mul(b_factor, b.y)),
           hn::MulAdd(a_factor, a.z, hn::Mul(b_factor, b.z))};
-}
-
-HWY_INLINE Vector cross(const Vector& a, const Vector& b) {
-  return {hn::MulSub(a.y, b.z, hn::Mul(a.z, b.y)), hn::MulSub(a.z, b.x, hn::Mul(a.x, b.z)),
-          hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x))};
 }
 
 /// One row of kRow numbers for each lane, one after another.

@@ -1,6 +1,6 @@
 // Fits the rotations of many cells at a time, one per lane: the method of rotation_fit.cc in vector instructions. Rotations
 // are found in single precision. Newton steps in double precision make them exact.
-// cell_kernel.cc and membrane_kernel.cc include this file once for each instruction set, as Highway requires; hence this include guard.
+// cell_kernel.cc, membrane_kernel.cc and turn_kernel.cc include this file once for each instruction set, as Highway requires; hence this include guard.
 #if defined(LPDEFORM_ROTATION_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef LPDEFORM_ROTATION_LANES_INL_H
 #undef LPDEFORM_ROTATION_LANES_INL_H
@@ -46,6 +46,15 @@ HWY_INLINE V dot(const Vector& a, const Vector& b) {
 
 HWY_INLINE Vector difference(const Vector& a, const Vector& b) {
   return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+
+HWY_INLINE Vector scaled(V factor, const Vector& a) {
+  return {hn::Mul(factor, a.x), hn::Mul(factor, a.y), hn::Mul(factor, a.z)};
+}
+
+HWY_INLINE Vector cross(const Vector& a, const Vector& b) {
+  return {hn::MulSub(a.y, b.z, hn::Mul(a.z, b.y)), hn::MulSub(a.z, b.x, hn::Mul(a.x, b.z)),
+          hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x))};
 }
 
 HWY_INLINE Vector times(const Matrix& a, const Vector& v) {

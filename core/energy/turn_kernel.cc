@@ -25,17 +25,8 @@ constexpr double kDamping = 1e-6;
 constexpr double kMostTangent = 1;
 constexpr std::size_t kTurningEdge = 6 * kLanes;  // numbers of a slot in the buffer of edges: e, then b
 
-HWY_INLINE Vector cross(const Vector& a, const Vector& b) {
-  return {hn::MulSub(a.y, b.z, hn::Mul(a.z, b.y)), hn::MulSub(a.z, b.x, hn::Mul(a.x, b.z)),
-          hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x))};
-}
-
 HWY_INLINE Vector sum(const Vector& a, const Vector& b) {
   return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
-}
-
-HWY_INLINE Vector scaled(V s, const Vector& a) {
-  return {hn::Mul(s, a.x), hn::Mul(s, a.y), hn::Mul(s, a.z)};
 }
 
 /// Writes the edges of the lanes from `lane` on at both positions to `edges`, as [slot][position][axis][lane].

@@ -27,7 +27,7 @@ struct TurnedMotion {
 /// How the turned edges of a motion differ from those where it ends, for the cells of blocks first to last - 1. `state` gets them as
 /// residuals; its other numbers stay as they are:
 ///
-///   r_ij = w_ij (T_i e_ij - y_ij)
+///   r_ij = w_ij (e_ij T_i - y_ij)
 ///
 /// where e_ij and y_ij are the edges from i to its neighbours where the motion begins and where it ends, and T_i is the turn at vertex i.
 /// Different blocks may be computed at the same time.

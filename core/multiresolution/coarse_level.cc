@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/multiresolution/coarse_handles.h"
@@ -109,6 +110,7 @@ absl::Status CoarseLevel::restrict_inputs(const FineInputs& fine) {
     coarse.stiffness = std::move(stiffness);
   }
   bending_ = fine.bending;
+  is_lowest_at_inputs_ = false;
   absl::Status status = solver_->set_material(coarse);
   status.Update(solver_->set_handles(
       coarse_handles({fine.shape, *shape_, fine_vertex_, coarse_vertex_}, fine.handles, fine.constraints)));
@@ -141,6 +143,7 @@ std::optional<CoarseMotion> CoarseLevel::lead(const FineInputs& fine, const Poin
   if (!go_to_handles(InitialGuess::kCurrent, most_iterations(fine.material), std::move(stop)))
     return std::nullopt;
   led_to_ = pose(fine.shape);
+  is_lowest_at_inputs_ = true;
   CoarseMotion motion;
   motion.positions =
       carried(from ? *from : fine.shape.scaled_positions(), *before, *led_to_, workers, &motion.turns);
@@ -152,10 +155,20 @@ std::optional<double> CoarseLevel::least_energy(const FineInputs& fine, InitialG
   if (!led_to_ && !has_level_below()) led_to_ = pose(fine.shape);
   if (!restrict_inputs(fine).ok()) return std::nullopt;
   bend_like_fine();
-  if (has_level_below()) return solver_->least_energy(initial, std::move(stop));
+  if (has_level_below()) {
+    const std::optional<double> least = solver_->least_energy(initial, std::move(stop));
+    is_lowest_at_inputs_ = least.has_value();
+    return least;
+  }
   if (!go_to_handles(initial, kMostLeading, std::move(stop)) || solver_->iterations() == 0)
     return std::nullopt;
+  is_lowest_at_inputs_ = true;
   return solver_->energy();
+}
+
+double CoarseLevel::lowest_energy() const {
+  if (!is_lowest_at_inputs_) return std::numeric_limits<double>::quiet_NaN();
+  return has_level_below() ? solver_->lowest_energy() : solver_->energy();
 }
 
 int CoarseLevel::most_iterations(const Material& material) const {

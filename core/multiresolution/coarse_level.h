@@ -66,8 +66,9 @@ class CoarseLevel {
   /// caller's units: at p = 2, about what the fine level's minimum has. The levels above stay where they are. nullopt if a level does
   /// not take the inputs, or if the lowest one makes no iteration.
   std::optional<double> least_energy(const FineInputs& fine, InitialGuess initial, std::stop_token stop);
-  /// E of the lowest level where it is: where the last lead() or least_energy() has come to. In the caller's units.
-  double lowest_energy() const { return has_level_below() ? solver_->lowest_energy() : solver_->energy(); }
+  /// E of the lowest level where the last lead() or least_energy() has come to, in the caller's units. NaN if the level has taken other
+  /// inputs or another state since then.
+  double lowest_energy() const;
   /// The fine level, which is at `x` (scaled units), goes on alone. The next lead() first moves the coarse levels as it has moved
   /// by then.
   void go_alone(const Points& x);
@@ -139,6 +140,7 @@ class CoarseLevel {
   std::unique_ptr<LevelSolver> solver_;
   /// The solver's state, where lead() has come to it. least_energy() may since have moved the solver of the lowest level on.
   std::optional<Pose> led_to_;
+  bool is_lowest_at_inputs_ = false;  // see lowest_energy()
   std::optional<Points>
       alone_from_;  // the fine state at the coarse vertices, from which the fine level goes alone
 };

@@ -78,7 +78,7 @@ class Deformer {
   void displace(const Points& by);
   /// Only for coarse levels: CoarseLevel::least_energy() of the level below. nullopt if there is none.
   std::optional<double> least_energy(InitialGuess initial, std::stop_token stop);
-  /// Only for coarse levels: E of the lowest level where it is, which is this one if there is none below.
+  /// Only for coarse levels: CoarseLevel::lowest_energy() of the level below. E of this one if there is none.
   double lowest_energy() const;
 
   /// Begins a solve. Errors: FAILED_PRECONDITION (NO_HANDLES); INVALID_ARGUMENT (METHOD_NEEDS_P,

@@ -199,7 +199,7 @@ struct Deformer::Impl {
   Lead lead = Lead::kNone;
   bool is_coarsest = false;      // the coarse level could not be made
   bool goes_alone = false;       // the guess of the running or the last solve is that of guess_alone()
-  bool is_close = false;         // and its E^(1/2) is little above that of the lowest level
+  bool is_close = false;         // and its E^(1/p) is little above that of the lowest level, or as usual
   bool is_guess_smooth = false;  // see Deformer::is_guess_smooth()
   int moves_to_lead = 0;         // by the coarse levels, before guess_alone() is tried again
   int fine_iterations = 0;       // of the running solve

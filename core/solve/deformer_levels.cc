@@ -21,7 +21,8 @@ constexpr std::int32_t kLargestSearchedLevel =
 // level is too large to be searched itself.
 constexpr double kLeastSavingOfLevel = 0.02;
 constexpr std::int32_t kNever = std::numeric_limits<std::int32_t>::max();  // vertices
-constexpr double kLeastPToCompare = 1.5;                                   // see can_compare_guesses
+// See can_compare_guesses. At p = 1, where kinks move, going alone is not nearer to the minimum in the same time.
+constexpr double kLeastPToCompare = 1.5;
 constexpr double kWorthGoing = 32000;  // vertices; see is_guess_good_enough
 
 class DeformerOfLevel : public LevelSolver {
@@ -113,7 +114,7 @@ bool Deformer::Impl::can_judge_guesses() const {
          constraints->linear.empty() && CoarseLevel::can_lead(*shape, least_bending());
 }
 
-/// Whether it does so compared with what it was after a move that had time: at a p below 2 that is not too near 1.
+/// Whether the change of the lowest level's energy since a move that had time tells so: at one p below 2 that is not too near 1.
 bool Deformer::Impl::can_compare_guesses() const {
   return !is_coarse() && material.p.size() == 1 && material.p(0) >= kLeastPToCompare && material.p(0) < 2 &&
          constraints->soft.empty() && constraints->linear.empty();

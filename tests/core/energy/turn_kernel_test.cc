@@ -49,6 +49,7 @@ std::vector<TurnedEdge> turned_edges(const RestShape& shape, const Points& befor
       result.push_back({i, j, w, e, residual / w + e + share * (e - b)});
     }
   }
+  EXPECT_GE(result.size(), shape.neighbours().size() / 2);
   return result;
 }
 

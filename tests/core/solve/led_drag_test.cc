@@ -165,6 +165,28 @@ TEST_P(LedDragAtOneAndAHalfTest, IsLedAgainAfterAChangeOfP) {
   EXPECT_TRUE(live->is_guess_smooth());
 }
 
+/// The lowest level is at other handles then, and at another p. What is found too high must not let the surface fall behind.
+TEST_P(LedDragAtOneAndAHalfTest, IsLedAfterAChangeOfPAlsoWhereTheFirstMoveHasTime) {
+  ASSERT_TRUE(live->set_material(Material::uniform(2)).ok());
+  for (int number = 1; number < 10; ++number) (void)move(number, 20);
+  ASSERT_TRUE(live->set_material(Material::uniform(1.5)).ok());
+  (void)move(10, 20);
+  for (int number = 11; number < 14; ++number) (void)move(number, 2);
+  EXPECT_TRUE(live->is_guess_smooth());
+}
+
+TEST_P(LedDragAtOneAndAHalfTest, GivesTheSameBitsOnAnyNumberOfThreads) {
+  auto other = deformer(shape, bent(0), Material::uniform(1.5), {.threads = 2});
+  (void)other->solve({});
+  for (int number = 1; number <= 6; ++number) {
+    (void)move(number, 8);
+    ASSERT_TRUE(other->set_handles(bent(number)).ok());
+    (void)solve(*other, 8);
+  }
+  EXPECT_FALSE(live->is_guess_smooth());  // alone
+  EXPECT_EQ(live->positions(), other->positions());
+}
+
 INSTANTIATE_TEST_SUITE_P(AtOneAndAHalf, LedDragAtOneAndAHalfTest, testing::Values(1.5));
 
 class LedDragAtSixTest : public LedDragTest {};
