@@ -21,7 +21,7 @@ constexpr double kHardlyAbove = 1.1;  // see may_be_shown
 constexpr int kTimeToGoAlone = 6;
 constexpr double kMostOverUsual = 1.05;
 // A lowest level whose E^(1/p) is this many times less tells nothing: its own is of rounding.
-constexpr double kMostUsual = 10;
+constexpr double kMostUsual = 1000;
 // Moves that coarse levels lead after guess_alone has refused at p = 2, and where there was no time for an iteration after a guess that was not close.
 constexpr int kMovesToLead = 3, kMovesToLeadWithoutTime = 12;
 // Where coarse levels can lead, edges turn on after a move of at least this many iterations; see continued.
@@ -188,17 +188,14 @@ Points Deformer::Impl::continued(Points forces) {
 
 /// How many times the E^(1/p) of the lowest level the guess alone may have; 0 if the lowest level tells nothing. At p = 2 it tells about
 /// what the minimum has. At another p it may be far from it. But it changes with the handles in the same way, so that a guess can be
-/// compared with the state after a move that had time. Of several such moves without a refusal the least counts, so that the surface
-/// cannot fall behind a little with each. Sets usual_over_least, and has to be called before the lowest level goes to the new handles.
+/// compared with the state after the last move that had time. Sets usual_over_least, and has to be called before the lowest level goes
+/// to the new handles.
 double Deformer::Impl::most_over_least() {
   if (can_judge_guesses()) return kMostOverLeast;
   if (!can_compare_guesses()) return 0;
   if (fine_iterations >= kTimeToGoAlone) {
-    const double now = std::pow(energy_before / coarse->lowest_energy(), 1 / material.p(0));
-    if (now <= kMostUsual)
-      usual_over_least = std::min(now, usual_over_least.value_or(now));
-    else
-      usual_over_least.reset();
+    const double over = std::pow(energy_before / coarse->lowest_energy(), 1 / material.p(0));
+    usual_over_least = over <= kMostUsual ? std::optional(over) : std::nullopt;
   }
   return kMostOverUsual * usual_over_least.value_or(0);
 }
