@@ -25,6 +25,11 @@ constexpr int kStageIterations = 60;
 constexpr double kRough = 2e-3;
 constexpr int kRoughWindow = 5;
 
+/// A live session's stage of smoothing also ends where f_(k - kNearWindow) - f_k <= s (f_k - F_k) , F the objective without smoothing,
+/// s = kNear where the lowest p_i >= kRounded . Else s = kVeryNear , and only the first stage ends so.
+constexpr int kNearWindow = 5;
+constexpr double kNear = 0.1, kVeryNear = 0.01, kRounded = 1.5;
+
 /// The metric is refactored where r >= kRefresh , r the iterations since it was; or where t < kShortStep and r >= kSoonest .
 constexpr int kRefresh = 40, kSoonest = 2;
 constexpr double kShortStep = 0.9;
@@ -58,7 +63,8 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, Warmth warmth)
       norm_(problem_.norm),
       x_(std::move(x)),
       memory_(problem_.objective.cells().workers(), kMemory),
-      is_prepared_(warmth == Warmth::kPrepared) {
+      is_prepared_(warmth == Warmth::kPrepared),
+      is_live_(warmth == Warmth::kWithMetric) {
   const double lowest = problem_.norm.lowest_p();
   if (lowest < 2) eps2_ = first_smoothing(warmth, lowest);
   // If all p_i > 2, there is no continuation from p = 2: it leads into worse minima (a bent cactus at p = 6 ends at 1.8
@@ -223,8 +229,18 @@ double QuasiNewton::search(double slope) {
   return 0;
 }
 
+/// Whether a live session's stage of smoothing is so near to its minimum that smoothing itself keeps the state farther from the true
+/// minimum, as far as the last iterations tell.
+bool QuasiNewton::is_smoothing_in_the_way() const {
+  const bool is_rounded = problem_.norm.lowest_p() >= kRounded;
+  if (!is_live_ || history_.size() <= kNearWindow || (!is_rounded && stage_ > 0)) return false;
+  const double gained = history_[history_.size() - 1 - kNearWindow] - objective_;
+  return gained <= (is_rounded ? kNear : kVeryNear) * (objective_ - true_sum_);
+}
+
 bool QuasiNewton::is_stage_over() const {
   const bool is_smoothing = !is_last_stage_ && stage_ >= static_cast<int>(shares_.size());
+  if (is_smoothing && is_smoothing_in_the_way()) return true;
   const int window = is_smoothing && problem_.tolerance >= kRough ? kRoughWindow : kWindow;
   if (static_cast<int>(history_.size()) <= window) return false;
   const double tolerance = (is_last_stage_ ? 1 : kStageTolerance) * problem_.tolerance;

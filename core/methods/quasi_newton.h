@@ -30,7 +30,9 @@ enum class Warmth {
 /// iteration, and after a shortened step, which shows that the weights have changed. The memory then keeps the last pair,
 /// in the new metric; without it, p > 2 and shallow valleys take two to three times as many iterations. If no weight has
 /// changed (p = 2), all pairs are kept. In a live session the method starts at p_i with an eps that adds at most a tenth
-/// to the mean cell's E^p, and keeps the previous metric for its first ten iterations.
+/// to the mean cell's E^p, and keeps the previous metric for its first ten iterations. There, a stage of smoothing also ends where
+/// five iterations have gained much less than smoothing adds. At p_i < 1.5 only the first stage does: a small eps holds kinks where
+/// they are.
 ///
 /// If no p_i is below 2 and the largest is over 12, a cold solve first has one stage near p = 4. This takes fewer
 /// iterations in total; without it, a bent grid folds. If the largest is over 4, a solve that starts from a coarse level
@@ -77,6 +79,7 @@ class QuasiNewton : public Minimiser {
   void accept(double length);
   StepResult give_up(double slope);
   bool is_stage_over() const;
+  bool is_smoothing_in_the_way() const;
   StepResult result(Outcome outcome);
 
   Problem problem_;
@@ -97,6 +100,7 @@ class QuasiNewton : public Minimiser {
   double true_sum_ = 0;       // the sum of problem_.norm at x_
   LbfgsMemory memory_;
   const bool is_prepared_;      // x comes from a coarse level
+  const bool is_live_;          // Warmth::kWithMetric
   std::deque<double> history_;  // objectives of the stage's last 21 iterations
   int stage_iterations_ = 0, since_refresh_ = 0;
   bool is_metric_good_ = false;

@@ -107,6 +107,25 @@ TEST_P(DragTest, FramesThatRefineAMoveGoOneWay) {
   }
 }
 
+/// Smoothing ends as soon as it is in the way. With 20 iterations for each stage of smoothing, these moves would take 100 or more.
+TEST(SmoothedDragTest, SmallMovesTakeFewIterations) {
+  for (const PaperPose& pose : {paper_bar(0.5), paper_block(0.5), paper_sheet(0.5)}) {
+    const auto live = deformer(rest_shape(pose.mesh), part_way(pose.handles, 0), Material::uniform(1.5));
+    ASSERT_TRUE(live->solve({.effort = 0}).ok());
+    for (int move = 1; move <= 8; ++move) {
+      ASSERT_TRUE(live->set_handles(part_way(pose.handles, move / 8.0)).ok());
+      ASSERT_TRUE(live->solve({.effort = 0}).ok());
+      if (move < 3) continue;  // the first two guesses are far from their minima
+      EXPECT_LE(live->summary().iterations, 60) << pose.name << ", move " << move;
+      EXPECT_EQ(live->summary().stop_reason, StopReason::kConverged);
+    }
+    const double energy = live->summary().energy;
+    const auto cold = deformer(rest_shape(pose.mesh), pose.handles, Material::uniform(1.5));
+    ASSERT_TRUE(cold->solve({.effort = 0}).ok());
+    EXPECT_LE(energy, 1.0001 * cold->summary().energy) << pose.name;
+  }
+}
+
 TEST_P(DragTest, ADragBackToTheStartEndsAtRest) {
   for (const PaperPose& pose : poses()) {
     const auto live =
