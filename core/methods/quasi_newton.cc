@@ -25,7 +25,7 @@ constexpr int kStageIterations = 60;
 constexpr double kRough = 2e-3;
 constexpr int kRoughWindow = 5;
 
-/// A live session's stage of smoothing also ends where f_(k - kNearWindow) - f_k <= s (f_k - F_k) , F the objective without smoothing,
+/// With Warmth::kWithMetric a stage of smoothing but the last also ends where f_(k - kNearWindow) - f_k <= s (f_k - F_k) , F the objective without smoothing,
 /// s = kNear where the lowest p_i >= kRounded . Else s = kVeryNear , and only the first stage ends so.
 constexpr int kNearWindow = 5;
 constexpr double kNear = 0.1, kVeryNear = 0.01, kRounded = 1.5;
@@ -33,7 +33,7 @@ constexpr double kNear = 0.1, kVeryNear = 0.01, kRounded = 1.5;
 /// The metric is refactored where r >= kRefresh , r the iterations since it was; or where t < kShortStep and r >= kSoonest .
 constexpr int kRefresh = 40, kSoonest = 2;
 constexpr double kShortStep = 0.9;
-/// A live session begins with r = kRefresh - kTrial : it keeps the metric that it finds for kTrial iterations.
+/// A live session begins with r = kRefresh - kTrial : it keeps the metric that it finds for kTrial iterations or for a stage.
 constexpr int kTrial = 10;
 
 /// From one stage of smoothing to the next, eps^2 becomes kSmoothingStep eps^2 .
@@ -229,8 +229,8 @@ double QuasiNewton::search(double slope) {
   return 0;
 }
 
-/// Whether a live session's stage of smoothing is so near to its minimum that smoothing itself keeps the state farther from the true
-/// minimum, as far as the last iterations tell.
+/// Whether a stage of smoothing but the last can end: the last iterations have gained little compared with what smoothing adds. It reads
+/// true_sum_, which between accept() and result() is that of the state before.
 bool QuasiNewton::is_smoothing_in_the_way() const {
   const bool is_rounded = problem_.norm.lowest_p() >= kRounded;
   if (!is_live_ || history_.size() <= kNearWindow || (!is_rounded && stage_ > 0)) return false;

@@ -30,9 +30,10 @@ enum class Warmth {
 /// iteration, and after a shortened step, which shows that the weights have changed. The memory then keeps the last pair,
 /// in the new metric; without it, p > 2 and shallow valleys take two to three times as many iterations. If no weight has
 /// changed (p = 2), all pairs are kept. In a live session the method starts at p_i with an eps that adds at most a tenth
-/// to the mean cell's E^p, and keeps the previous metric for its first ten iterations. There, a stage of smoothing also ends where
-/// five iterations have gained much less than smoothing adds. At p_i < 1.5 only the first stage does: a small eps holds kinks where
-/// they are.
+/// to the mean cell's E^p, and keeps the previous metric for its first ten iterations, or for its first stage if that is shorter.
+/// With Warmth::kWithMetric, which further starts of a search have, too, each stage of smoothing but the last also ends where the last
+/// five iterations have gained little compared with what smoothing adds. If some p_i < 1.5, this holds for the first stage only: a
+/// small eps holds kinks where they are.
 ///
 /// If no p_i is below 2 and the largest is over 12, a cold solve first has one stage near p = 4. This takes fewer
 /// iterations in total; without it, a bent grid folds. If the largest is over 4, a solve that starts from a coarse level

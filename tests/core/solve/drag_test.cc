@@ -115,7 +115,7 @@ TEST(SmoothedDragTest, SmallMovesTakeFewIterations) {
     for (int move = 1; move <= 8; ++move) {
       ASSERT_TRUE(live->set_handles(part_way(pose.handles, move / 8.0)).ok());
       ASSERT_TRUE(live->solve({.effort = 0}).ok());
-      if (move < 3) continue;  // the first two guesses are far from their minima
+      if (move < 3) continue;  // move 1 is a cold solve, and the second guess is far from its minimum
       EXPECT_LE(live->summary().iterations, 60) << pose.name << ", move " << move;
       EXPECT_EQ(live->summary().stop_reason, StopReason::kConverged);
     }
