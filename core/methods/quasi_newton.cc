@@ -25,10 +25,10 @@ constexpr int kStageIterations = 60;
 constexpr double kRough = 2e-3;
 constexpr int kRoughWindow = 5;
 
-/// With Warmth::kWithMetric a stage of smoothing but the last also ends where f_(k - kNearWindow) - f_k <= s (f_k - F_k) , F the objective without smoothing,
-/// s = kNear where the lowest p_i >= kRounded . Else s = kVeryNear , and only the first stage ends so.
+/// With Warmth::kWithMetric, the lowest p_i < kKinked and no p_i > 2, the first stage of smoothing also ends where
+/// f_(k - kNearWindow) - f_k <= kNear (f_k - F_k) , F the objective without smoothing.
 constexpr int kNearWindow = 5;
-constexpr double kNear = 0.1, kVeryNear = 0.01, kRounded = 1.5;
+constexpr double kNear = 0.003, kKinked = 1.5;
 
 /// The metric is refactored where r >= kRefresh , r the iterations since it was; or where t < kShortStep and r >= kSoonest .
 constexpr int kRefresh = 40, kSoonest = 2;
@@ -64,7 +64,7 @@ QuasiNewton::QuasiNewton(Problem problem, Points x, Warmth warmth)
       x_(std::move(x)),
       memory_(problem_.objective.cells().workers(), kMemory),
       is_prepared_(warmth == Warmth::kPrepared),
-      is_live_(warmth == Warmth::kWithMetric) {
+      keeps_metric_(warmth == Warmth::kWithMetric) {
   const double lowest = problem_.norm.lowest_p();
   if (lowest < 2) eps2_ = first_smoothing(warmth, lowest);
   // If all p_i > 2, there is no continuation from p = 2: it leads into worse minima (a bent cactus at p = 6 ends at 1.8
@@ -229,13 +229,12 @@ double QuasiNewton::search(double slope) {
   return 0;
 }
 
-/// Whether a stage of smoothing but the last can end: the last iterations have gained little compared with what smoothing adds. It reads
+/// Whether the first stage of smoothing can end: the last iterations have gained little compared with what smoothing adds. It reads
 /// true_sum_, which between accept() and result() is that of the state before.
 bool QuasiNewton::is_smoothing_in_the_way() const {
-  const bool is_rounded = problem_.norm.lowest_p() >= kRounded;
-  if (!is_live_ || history_.size() <= kNearWindow || (!is_rounded && stage_ > 0)) return false;
-  const double gained = history_[history_.size() - 1 - kNearWindow] - objective_;
-  return gained <= (is_rounded ? kNear : kVeryNear) * (objective_ - true_sum_);
+  const bool has_rule = keeps_metric_ && problem_.norm.lowest_p() < kKinked && problem_.norm.highest_p() <= 2;
+  if (!has_rule || stage_ > static_cast<int>(shares_.size()) || history_.size() <= kNearWindow) return false;
+  return history_[history_.size() - 1 - kNearWindow] - objective_ <= kNear * (objective_ - true_sum_);
 }
 
 bool QuasiNewton::is_stage_over() const {

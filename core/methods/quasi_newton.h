@@ -31,9 +31,9 @@ enum class Warmth {
 /// in the new metric; without it, p > 2 and shallow valleys take two to three times as many iterations. If no weight has
 /// changed (p = 2), all pairs are kept. In a live session the method starts at p_i with an eps that adds at most a tenth
 /// to the mean cell's E^p, and keeps the previous metric for its first ten iterations, or for its first stage if that is shorter.
-/// With Warmth::kWithMetric, which further starts of a search have, too, each stage of smoothing but the last also ends where the last
-/// five iterations have gained little compared with what smoothing adds. If some p_i < 1.5, this holds for the first stage only: a
-/// small eps holds kinks where they are.
+/// If the lowest p_i < 1.5 and no p_i > 2, the first stage of a solve with Warmth::kWithMetric also ends where the last five iterations
+/// have gained little compared with what smoothing adds. Frames of a move then go a straighter way. At larger p_i a sheet that begins to
+/// buckle would stay at its saddle point.
 ///
 /// If no p_i is below 2 and the largest is over 12, a cold solve first has one stage near p = 4. This takes fewer
 /// iterations in total; without it, a bent grid folds. If the largest is over 4, a solve that starts from a coarse level
@@ -101,7 +101,7 @@ class QuasiNewton : public Minimiser {
   double true_sum_ = 0;       // the sum of problem_.norm at x_
   LbfgsMemory memory_;
   const bool is_prepared_;      // x comes from a coarse level
-  const bool is_live_;          // Warmth::kWithMetric
+  const bool keeps_metric_;     // Warmth::kWithMetric
   std::deque<double> history_;  // objectives of the stage's last 21 iterations
   int stage_iterations_ = 0, since_refresh_ = 0;
   bool is_metric_good_ = false;

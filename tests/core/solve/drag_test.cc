@@ -107,23 +107,23 @@ TEST_P(DragTest, FramesThatRefineAMoveGoOneWay) {
   }
 }
 
-/// Smoothing ends as soon as it is in the way. With 20 iterations for each stage of smoothing, these moves would take 100 or more.
-TEST(SmoothedDragTest, SmallMovesTakeFewIterations) {
-  for (const PaperPose& pose : {paper_bar(0.5), paper_block(0.5), paper_sheet(0.5)}) {
-    const auto live = deformer(rest_shape(pose.mesh), part_way(pose.handles, 0), Material::uniform(1.5));
+/// A sheet that begins to buckle is near to a saddle point, where some iterations gain little. A solve that took this for the end of a
+/// stage would leave five of these moves higher than a cold solve.
+TEST(BucklingDragTest, ASheetThatBeginsToBuckleLeavesItsSaddlePoint) {
+  constexpr int kMoves = 16;
+  const PaperPose pose = paper_sheet();
+  const auto live = deformer(rest_shape(pose.mesh), part_way(pose.handles, 0), Material::uniform(1.5));
+  ASSERT_TRUE(live->solve({.effort = 0}).ok());
+  int high = 0;
+  for (int move = 1; move <= kMoves; ++move) {
+    const HandleSet handles = part_way(pose.handles, 0.05 * move / kMoves);
+    ASSERT_TRUE(live->set_handles(handles).ok());
     ASSERT_TRUE(live->solve({.effort = 0}).ok());
-    for (int move = 1; move <= 8; ++move) {
-      ASSERT_TRUE(live->set_handles(part_way(pose.handles, move / 8.0)).ok());
-      ASSERT_TRUE(live->solve({.effort = 0}).ok());
-      if (move < 3) continue;  // move 1 is a cold solve, and the second guess is far from its minimum
-      EXPECT_LE(live->summary().iterations, 60) << pose.name << ", move " << move;
-      EXPECT_EQ(live->summary().stop_reason, StopReason::kConverged);
-    }
-    const double energy = live->summary().energy;
-    const auto cold = deformer(rest_shape(pose.mesh), pose.handles, Material::uniform(1.5));
+    const auto cold = deformer(rest_shape(pose.mesh), handles, Material::uniform(1.5));
     ASSERT_TRUE(cold->solve({.effort = 0}).ok());
-    EXPECT_LE(energy, 1.0001 * cold->summary().energy) << pose.name;
+    if (live->summary().energy > 1.001 * cold->summary().energy) ++high;
   }
+  EXPECT_LE(high, 2);
 }
 
 TEST_P(DragTest, ADragBackToTheStartEndsAtRest) {
