@@ -25,16 +25,16 @@ constexpr int kStageIterations = 60;
 constexpr double kRough = 2e-3;
 constexpr int kRoughWindow = 5;
 
-/// With Warmth::kWithMetric, the lowest p_i < kKinked and no p_i > 2, the first stage of smoothing also ends where
-/// f_(k - kNearWindow) - f_k <= kNear (f_k - F_k) , F the objective without smoothing.
-constexpr int kNearWindow = 5;
-constexpr double kNear = 0.003, kKinked = 1.5;
-
 /// The metric is refactored where r >= kRefresh , r the iterations since it was; or where t < kShortStep and r >= kSoonest .
 constexpr int kRefresh = 40, kSoonest = 2;
 constexpr double kShortStep = 0.9;
 /// A live session begins with r = kRefresh - kTrial : it keeps the metric that it finds for kTrial iterations or for a stage.
 constexpr int kTrial = 10;
+
+/// If the lowest p_i < kKinkedP and no p_i > 2, the first stage of a live session also ends where k >= kTrial and
+/// f_(k - kLittleWindow) - f_k <= kLittle (f_k - F_k) , F the objective without smoothing. The metric is refactored then either way.
+constexpr int kLittleWindow = 5;
+constexpr double kLittle = 0.01, kKinkedP = 1.1;
 
 /// From one stage of smoothing to the next, eps^2 becomes kSmoothingStep eps^2 .
 constexpr double kSmoothingStep = 0.1;
@@ -229,12 +229,12 @@ double QuasiNewton::search(double slope) {
   return 0;
 }
 
-/// Whether the first stage of smoothing can end: the last iterations have gained little compared with what smoothing adds. It reads
-/// true_sum_, which between accept() and result() is that of the state before.
+/// Whether the first stage of a live session can end, because the last iterations have gained little compared with what smoothing adds.
+/// To be called at the start of a step, where true_sum_ is that of x_.
 bool QuasiNewton::is_smoothing_in_the_way() const {
-  const bool has_rule = keeps_metric_ && problem_.norm.lowest_p() < kKinked && problem_.norm.highest_p() <= 2;
-  if (!has_rule || stage_ > static_cast<int>(shares_.size()) || history_.size() <= kNearWindow) return false;
-  return history_[history_.size() - 1 - kNearWindow] - objective_ <= kNear * (objective_ - true_sum_);
+  const bool may_end = keeps_metric_ && stage_ == 0 && stage_iterations_ >= kTrial;
+  if (!may_end || problem_.norm.lowest_p() >= kKinkedP || problem_.norm.highest_p() > 2) return false;
+  return history_[history_.size() - 1 - kLittleWindow] - objective_ <= kLittle * (objective_ - true_sum_);
 }
 
 bool QuasiNewton::is_stage_over() const {

@@ -31,9 +31,9 @@ enum class Warmth {
 /// in the new metric; without it, p > 2 and shallow valleys take two to three times as many iterations. If no weight has
 /// changed (p = 2), all pairs are kept. In a live session the method starts at p_i with an eps that adds at most a tenth
 /// to the mean cell's E^p, and keeps the previous metric for its first ten iterations, or for its first stage if that is shorter.
-/// If the lowest p_i < 1.5 and no p_i > 2, the first stage of a solve with Warmth::kWithMetric also ends where the last five iterations
-/// have gained little compared with what smoothing adds. Frames of a move then go a straighter way. At larger p_i a sheet that begins to
-/// buckle would stay at its saddle point.
+/// If the lowest p_i < 1.1 and no p_i > 2, the first stage of such a solve also ends where, after ten iterations or more, the last five
+/// have gained little compared with what smoothing adds. Frames of a small move then go a straighter way. Further starts of a search
+/// count as a live session here.
 ///
 /// If no p_i is below 2 and the largest is over 12, a cold solve first has one stage near p = 4. This takes fewer
 /// iterations in total; without it, a bent grid folds. If the largest is over 4, a solve that starts from a coarse level
