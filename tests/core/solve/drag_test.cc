@@ -107,6 +107,23 @@ TEST_P(DragTest, FramesThatRefineAMoveGoOneWay) {
   }
 }
 
+/// Small moves go on with smoothing from where the last one has ended, and end where a cold solve does.
+TEST(SmoothedDragTest, SmallMovesEndAsLowAsAColdSolve) {
+  for (const PaperPose& pose : {paper_bar(0.5), paper_block(0.5), paper_sheet(0.5)}) {
+    const auto live = deformer(rest_shape(pose.mesh), part_way(pose.handles, 0), Material::uniform(1.5));
+    ASSERT_TRUE(live->solve({.effort = 0}).ok());
+    for (int move = 1; move <= 8; ++move) {
+      ASSERT_TRUE(live->set_handles(part_way(pose.handles, move / 8.0)).ok());
+      ASSERT_TRUE(live->solve({.effort = 0}).ok());
+      EXPECT_EQ(live->summary().stop_reason, StopReason::kConverged) << pose.name << ", move " << move;
+    }
+    const double energy = live->summary().energy;
+    const auto cold = deformer(rest_shape(pose.mesh), pose.handles, Material::uniform(1.5));
+    ASSERT_TRUE(cold->solve({.effort = 0}).ok());
+    EXPECT_LE(energy, 1.0001 * cold->summary().energy) << pose.name;
+  }
+}
+
 /// A sheet that begins to buckle is near to a saddle point, where some iterations gain little. If every stage of smoothing ended where five
 /// iterations gain a tenth of what smoothing adds, five of these moves would end higher than a cold solve.
 TEST(BucklingDragTest, ASheetThatBeginsToBuckleLeavesItsSaddlePoint) {
