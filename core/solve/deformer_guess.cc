@@ -12,16 +12,18 @@ constexpr double kFarthestGuess = 2;  // the guess continues the last move by le
 constexpr double kSameWay = 0.5;      // two moves count as one drag above this squared cosine between them
 // In such a drag, the squared ratio of the surface's largest move to the handles' largest move is below this.
 constexpr double kSteady = 9;
-constexpr double kMostAbove = 2;      // see is_good
-constexpr double kClose = 1.25;       // see is_close
-constexpr double kLittleAbove = 1.2;  // see is_as_good_as_before
-constexpr double kHardlyAbove = 1.1;  // see may_be_shown
+constexpr double kMostAbove = 2, kMostAboveAtP = 1.3;  // see is_good
+constexpr double kClose = 1.25;                        // see is_close
+constexpr double kLittleAbove = 1.2;                   // see is_as_good_as_before
+constexpr double kHardlyAbove = 1.1;                   // see may_be_shown
 // A move of so many iterations had time. Where guesses can only be compared, the guess alone may then have kMostOverUsual times as much
 // of the lowest level's E^(1/p) as the state after that move; see most_over_least.
 constexpr int kTimeToGoAlone = 6;
 constexpr double kMostOverUsual = 1.05;
 // A lowest level whose E^(1/p) is this many times less tells nothing: its own is of rounding.
 constexpr double kMostUsual = 1000;
+// Guesses of the coarse levels that are refused one after the other, until the coarse levels begin again from the surface.
+constexpr int kMostRefused = 10;
 // Moves that coarse levels lead after guess_alone has refused at p = 2, and where there was no time for an iteration after a guess that was not close.
 constexpr int kMovesToLead = 3, kMovesToLeadWithoutTime = 12;
 // Where coarse levels can lead, edges turn on after a move of at least this many iterations; see continued.
@@ -94,11 +96,19 @@ std::optional<Points> Deformer::Impl::led_guess() {
   return fitted(moved, turning_forces(TurnedMotion{from.data(), moved.data(), motion->turns.data()}));
 }
 
-/// Whether a led guess is not much worse than the other one: at p = 2 its E^(1/2) is at most kMostAbove times as high. It may be higher,
-/// because it has kinks that the first iterations take away. At a large p a few kinks would decide.
-bool Deformer::Impl::is_good(const Points& led, const Points& other) {
-  const double most = kMostAbove * kMostAbove * objective.evaluate(other, even_norm());
-  return objective.evaluate(led, even_norm()) <= most;
+/// Whether guesses are compared in the norm that is solved for: if no p_i is above 2. At a larger p a few kinks would decide, which the
+/// first iterations take away. Otherwise, and with soft targets, for which `objective` still has those of the last solve, the norm is
+/// that of p = 2. At a lower p it hides what is spread over many cells.
+bool Deformer::Impl::compares_at_p() const {
+  return material.p.maxCoeff() <= 2 && material.p.minCoeff() < 2 && constraints->soft.empty();
+}
+
+/// Whether a led guess is not much worse than the other one, by their sums in that norm: its E^(1/p), p the lowest p_i, is at most
+/// kMostAbove times as high, or kMostAboveAtP times at p < 2. It may be higher, because it has kinks that the first iterations take away.
+bool Deformer::Impl::is_good(double led, double other) const {
+  const double most =
+      compares_at_p() ? std::pow(kMostAboveAtP, material.p.minCoeff()) : kMostAbove * kMostAbove;
+  return led <= most * other;
 }
 
 /// The same without another guess: its E^(1/2) at p = 2 is at most kLittleAbove times as high as that of the state before the move.
@@ -139,6 +149,7 @@ void Deformer::Impl::begin_move() {
 
 /// Begins with a led guess. If some p_i > 2, the weights of the move before differ so much that a step in their metric is cut short.
 Points Deformer::Impl::go_with(Points led) {
+  refused = 0;
   if (material.p.maxCoeff() > 2) warmth = Warmth::kWarm;
   return led;
 }
@@ -253,6 +264,7 @@ Points Deformer::Impl::current_guess() {
     usual_over_least.reset();
   }
   is_close = false;
+  const bool was_ahead = lead == Lead::kAhead;
   std::optional<Points> led = can_lead ? led_guess() : std::nullopt;
   if (led && is_as_good_as_before(*led)) {
     begin_move();
@@ -264,6 +276,13 @@ Points Deformer::Impl::current_guess() {
     begin_move();
     return go_with(*std::move(led));
   }
+  const bool has_soft = !constraints->soft.empty();
+  std::optional<LpNorm> norm;
+  double of_led = 0;
+  if (led && led->allFinite()) {
+    norm = compares_at_p() ? LpNorm(effective_material(), shape->vertex_count(), unit(), 1) : even_norm();
+    of_led = has_soft ? objective.evaluate(*led, *norm) : objective.sum(*norm);
+  }
   Points guess = continued(std::move(forces));
   begin_move();
   if (!can_lead) return guess;
@@ -271,8 +290,15 @@ Points Deformer::Impl::current_guess() {
     lead = Lead::kNone;
     return guess;
   }
-  if (led && is_good(*led, guess)) return go_with(*std::move(led));
-  follow(guess);
+  if (norm && is_good(of_led, objective.evaluate(guess, *norm))) return go_with(*std::move(led));
+  // The coarse levels stay where they have gone. If they followed to the guess, they would first go back to a minimum of their own in the
+  // next move, and the surface with them.
+  if (!norm || was_ahead || ++refused > kMostRefused) {
+    refused = 0;
+    follow(guess);
+  } else {
+    is_guess_evaluated = !has_soft;
+  }
   return guess;
 }
 

@@ -22,7 +22,7 @@ constexpr std::int32_t kLargestSearchedLevel =
 constexpr double kLeastSavingOfLevel = 0.02;
 constexpr std::int32_t kNever = std::numeric_limits<std::int32_t>::max();  // vertices
 // See can_compare_guesses. At p = 1, where kinks move, going alone is not nearer to the minimum in the same time.
-constexpr double kLeastPToCompare = 1.5;
+constexpr double kLeastPToCompare = 1.1;
 constexpr double kWorthGoing = 32000;  // vertices; see is_guess_good_enough
 
 class DeformerOfLevel : public LevelSolver {

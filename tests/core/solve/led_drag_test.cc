@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/core/poses.h"
@@ -143,18 +144,23 @@ TEST_P(LedDragOfLowPTest, IsLedOnAfterMovesThatItMadeAlone) {
 
 INSTANTIATE_TEST_SUITE_P(LowNorms, LedDragOfLowPTest, testing::Values(1.5, 2.0));
 
-class LedDragAtOneAndAHalfTest : public LedDragTest {};
+class LedDragBelowTwoTest : public LedDragTest {};
 
-/// Then the guess is the fine level's own, which is never shown before an iteration at p = 1.5.
-TEST_P(LedDragAtOneAndAHalfTest, GoesAloneAfterMovesThatHadTime) {
+/// Then the guess is the fine level's own, which is never shown before an iteration at p < 2. At p = 1.2 the surface needs one move more.
+TEST_P(LedDragBelowTwoTest, GoesAloneAfterMovesThatHadTime) {
   for (int number = 1; number < 10; ++number) (void)move(number, 2);
   (void)move(10, 20);
   EXPECT_TRUE(live->is_guess_smooth());
-  for (int number = 11; number < 16; ++number) {
+  if (GetParam() < 1.5) (void)move(11, 6);
+  for (int number = GetParam() < 1.5 ? 12 : 11; number < 16; ++number) {
     (void)move(number, 6);
     EXPECT_FALSE(live->is_guess_smooth()) << number;
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(BelowTwo, LedDragBelowTwoTest, testing::Values(1.2, 1.5));
+
+class LedDragAtOneAndAHalfTest : public LedDragTest {};
 
 /// What the surface had over the lowest level's energy at one p tells nothing at another one.
 TEST_P(LedDragAtOneAndAHalfTest, IsLedAgainAfterAChangeOfP) {
@@ -171,8 +177,28 @@ TEST_P(LedDragAtOneAndAHalfTest, IsLedAfterAChangeOfPAlsoWhereTheFirstMoveHasTim
   for (int number = 1; number < 10; ++number) (void)move(number, 20);
   ASSERT_TRUE(live->set_material(Material::uniform(1.5)).ok());
   (void)move(10, 20);
-  for (int number = 11; number < 14; ++number) (void)move(number, 2);
+  for (int number = 11; number < 16; ++number) (void)move(number, 2);
+  const SolveSummary last = move(16, 2);
   EXPECT_TRUE(live->is_guess_smooth());
+  EXPECT_LE(above_minimum(last), 1.08);
+}
+
+/// In a drag that waits for each move until it is within 5 %. The minimum of each is that of a second solver. Some guesses were 2.1 times
+/// the minimum where coarse levels led although they were up to twice as high at p = 2 as the fine level's own guess.
+TEST_P(LedDragAtOneAndAHalfTest, GuessesAreNearTheMinimumWhereMovesWait) {
+  const auto converged = deformer(shape, bent(0), Material::uniform(GetParam()));
+  (void)converged->solve({});
+  double most = 0;
+  for (int number = 1; number <= 12; ++number) {
+    ASSERT_TRUE(converged->set_handles(bent(number)).ok());
+    ASSERT_TRUE(live->set_handles(bent(number)).ok());
+    ASSERT_TRUE(live->start({.effort = 0}).ok());
+    const double least = solve(*converged, 1000).energy;
+    if (number > 3) most = std::max(most, std::pow(live->summary().energy / least, 1 / GetParam()));
+    while (std::pow(live->summary().energy / least, 1 / GetParam()) > 1.05 && live->step()) {
+    }
+  }
+  EXPECT_LE(most, 1.5);
 }
 
 TEST_P(LedDragAtOneAndAHalfTest, GivesTheSameBitsOnAnyNumberOfThreads) {
