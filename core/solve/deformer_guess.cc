@@ -22,7 +22,7 @@ constexpr int kTimeToGoAlone = 6;
 constexpr double kMostOverUsual = 1.05;
 // A lowest level whose E^(1/p) is this many times less tells nothing: its own is of rounding.
 constexpr double kMostUsual = 1000;
-// Guesses of the coarse levels that are refused one after the other, until the coarse levels begin again from the surface.
+// After so many refused guesses in a row, the coarse levels take the fine state over at the next refusal.
 constexpr int kMostRefused = 10;
 // Moves that coarse levels lead after guess_alone has refused at p = 2, and where there was no time for an iteration after a guess that was not close.
 constexpr int kMovesToLead = 3, kMovesToLeadWithoutTime = 12;
@@ -96,9 +96,9 @@ std::optional<Points> Deformer::Impl::led_guess() {
   return fitted(moved, turning_forces(TurnedMotion{from.data(), moved.data(), motion->turns.data()}));
 }
 
-/// Whether guesses are compared in the norm that is solved for: if no p_i is above 2. At a larger p a few kinks would decide, which the
-/// first iterations take away. Otherwise, and with soft targets, for which `objective` still has those of the last solve, the norm is
-/// that of p = 2. At a lower p it hides what is spread over many cells.
+/// Whether guesses are compared in the norm that is solved for, and not in that of p = 2. They are where no p_i is above 2, some p_i is
+/// below 2, and there are no soft targets. The norm of p = 2 hides what is spread over many cells, which counts at a lower p. At a larger
+/// p a few kinks would decide, which the first iterations take away. Soft targets in `objective` are still those of the last solve.
 bool Deformer::Impl::compares_at_p() const {
   return material.p.maxCoeff() <= 2 && material.p.minCoeff() < 2 && constraints->soft.empty();
 }

@@ -203,7 +203,7 @@ struct Deformer::Impl {
   bool is_close = false;         // and its E^(1/p) is little above that of the lowest level, or as usual
   bool is_guess_smooth = false;  // see Deformer::is_guess_smooth()
   int moves_to_lead = 0;         // by the coarse levels, before guess_alone() is tried again
-  int refused = 0;               // guesses of the coarse levels, one after the other; see current_guess()
+  int refused = 0;               // guesses of the coarse levels in a row; see current_guess()
   int fine_iterations = 0;       // of the running solve
   double energy_before = 0;      // E at the end of the solve before it
   // E^(1/p) at the end of the last move that had time, over that of the lowest level; see can_compare_guesses().
