@@ -78,6 +78,14 @@ bool Metric::factor(const std::vector<double>& cell_weights, const std::vector<c
   return is_good_ = factor_double();
 }
 
+void Metric::release() {
+  single_.free_values();
+  double_.reset();
+  copy_ = {};
+  matrix_ = {};
+  is_good_ = is_single_current_ = is_double_current_ = false;
+}
+
 bool Metric::factor_double() const {
   need_matrix();
   if (!double_) double_.emplace(matrix_, single_.result().new_to_old());

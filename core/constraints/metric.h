@@ -65,7 +65,10 @@ class Metric {
   /// that need not be exact. Requires is_factored_for().
   void adopt(const std::vector<double>& cell_weights);
 
-  /// Whether the last factor() was for these held vertices and succeeded.
+  /// Frees the factor's values, most of memory_bytes(). Until the next factor(), is_factored_for() is false, and nothing may be solved.
+  void release();
+
+  /// Whether the last factor() was for these held vertices and succeeded, and its factor has not been released.
   bool is_factored_for(const std::vector<char>& is_held) const { return is_good_ && is_held == is_held_; }
 
   /// x = M^-1 b to a relative error of about 1e-12; b is zero at held vertices. With a factor in single precision, by

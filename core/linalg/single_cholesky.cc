@@ -172,6 +172,7 @@ bool SingleCholesky::factor(const SymmetricRows& matrix, const Workers& workers,
   std::atomic<bool> is_good = true;
   std::atomic<int> raisable = most_raised;
   const Workers alone(1);
+  factor_.need_values();
   if (!factor_.stages_.empty()) {
     const SingleFactor::Stage& branches = factor_.stages_.front();
     workers.for_chunks(branches.size(), 1, [&](std::size_t k, std::size_t, std::size_t) {

@@ -26,6 +26,8 @@ class SingleCholesky {
   [[nodiscard]] bool factor(const SymmetricRows& matrix, const Workers& workers, int most_raised = 0);
 
   const SingleFactor& result() const { return factor_; }
+  /// Frees the values of the factor until the next factor().
+  void free_values() { factor_.free_values(); }
 
   std::size_t memory_bytes() const;
 

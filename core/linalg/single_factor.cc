@@ -34,6 +34,14 @@ float* SingleFactor::new_supernode(std::int32_t columns, const std::int32_t* row
   return values_.data() + supernodes_.back().first_value;
 }
 
+/// Makes room for the values if they have been freed.
+void SingleFactor::need_values() {
+  if (!values_.empty() || supernodes_.empty()) return;
+  const Supernode& last = supernodes_.back();
+  const auto columns = static_cast<std::size_t>(last.columns);
+  values_.resize(last.first_value + columns * (columns + last.row_count));
+}
+
 /// The supernode of each column.
 std::vector<std::int32_t> SingleFactor::node_of_columns() const {
   std::vector<std::int32_t> result(new_to_old_.size());

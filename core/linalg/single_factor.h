@@ -41,6 +41,9 @@ class SingleFactor {
 
   void finish();
 
+  /// Frees the values; the pattern stays.
+  void free_values() { std::vector<float>().swap(values_); }
+
   bool empty() const { return new_to_old_.empty(); }
   /// Makes the factor empty; keeps the memory.
   void clear() { new_to_old_.clear(); }
@@ -74,6 +77,7 @@ class SingleFactor {
   void solve_forward(std::int32_t first, std::int32_t last) const;
   void solve_backward(std::int32_t first, std::int32_t last) const;
   float* new_supernode(std::int32_t columns, const std::int32_t* rows, std::size_t row_count);
+  void need_values();
 
   std::vector<std::int32_t> new_to_old_;
   std::vector<Supernode> supernodes_;

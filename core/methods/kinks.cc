@@ -1,6 +1,7 @@
 #include "core/methods/kinks.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <vector>
 
@@ -17,6 +18,7 @@ constexpr double kFew = 0.001, kMuch = 0.5;
 constexpr double kEased = 0.005, kMost = 0.05;
 constexpr int kRings = 3;
 constexpr int kSweeps = 5;
+constexpr double kDamping = 2.0 / 3;  // of relax()
 
 std::vector<double> terms_of(const Problem& problem) {
   const std::vector<double>& squares = problem.objective.cells().squared_energies();
@@ -127,7 +129,50 @@ std::vector<std::int32_t> kinked_cells(const Problem& problem, double all) {
   return cells;
 }
 
+/// The diagonal of the metric of the objective's last evaluation. Off-diagonal entries of soft terms count with their absolute values,
+/// so that a sweep stays within them.
+std::vector<double> metric_diagonal(const Problem& problem) {
+  const RestShape& shape = problem.shape();
+  const std::vector<double>& c = problem.objective.cells().cell_weights();
+  std::vector<double> diagonal(c.size());
+  problem.workers().for_chunks(c.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      double sum = 0;
+      for (std::int32_t k = shape.offsets()[i]; k < shape.offsets()[i + 1]; ++k)
+        sum += shape.weights()[k] * (c[i] + c[shape.neighbours()[k]]);
+      diagonal[i] = 2 * sum;
+    }
+  });
+  for (const MatrixEntry& entry :
+       problem.objective.soft_terms().matrix_entries(problem.objective.soft_weights())) {
+    diagonal[entry.row] += std::abs(entry.value);
+    if (entry.column != entry.row) diagonal[entry.column] += std::abs(entry.value);
+  }
+  return diagonal;
+}
+
 }  // namespace
+
+void relax(const Problem& problem, const LpNorm& norm, int sweeps, Points& x) {
+  Points step;
+  for (int sweep = 0; sweep < sweeps && !problem.stop.stop_requested(); ++sweep) {
+    if (sweep == 0)
+      problem.objective.reweigh(norm);
+    else
+      problem.objective.evaluate(x, norm);
+    problem.objective.gradient(step);
+    const std::vector<double> diagonal = metric_diagonal(problem);
+    problem.workers().for_chunks(diagonal.size(), kChunk,
+                                 [&](std::size_t, std::size_t begin, std::size_t end) {
+                                   for (std::size_t i = begin; i < end; ++i) {
+                                     const auto row = static_cast<Eigen::Index>(i);
+                                     step.row(row) *= diagonal[i] > 0 ? kDamping / diagonal[i] : 0;
+                                   }
+                                 });
+    restrict_to_free(problem.constraints, step);
+    x -= step;
+  }
+}
 
 bool ease_kinks(const Problem& problem, Points& x) {
   const bool can_ease = problem.norm.highest_p() > 2 && problem.constraints.soft.empty() &&

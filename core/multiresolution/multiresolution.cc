@@ -38,6 +38,8 @@ constexpr double kMostLeft = 0.03;
 /// E^(1/p) with which the fine level goes on from the graded one, over that before: the first iterations take kinks away.
 constexpr double kMostAfterGraded = 1.1;
 
+constexpr int kSweeps = 3;  // of relax(), where the fine surface has moved along with the graded level
+
 constexpr int kCostOfLook = 5;  // looking at the coarse level takes at most one part in this many of the time
 
 }  // namespace
@@ -102,17 +104,19 @@ void Multiresolution::make_feasible(Points& found) const {
     problem_.constraints.linear.satisfy_within(problem_.metric, found, problem_.workers());
 }
 
-/// Blended rigid motions leave kinks. One local/global step smooths them. Before the first fine iteration the metric is that of equal
-/// weights, with which the guess was made, and the step is one of p = 2. After that it is the one that QuasiNewton has left, and the
-/// step is one of the norm that it belongs to.
+/// Blended rigid motions leave kinks. One local/global step at p = 2 smooths them: the metric is that of equal weights, with which the
+/// guess was made.
 void Multiresolution::even_out(Points& found) const {
-  const LpNorm even(Material::uniform(2), problem_.shape().vertex_count(), 1, 1);
   Points step;
-  problem_.objective.evaluate(found, fine_iterations_ > 0 ? problem_.norm : even);
+  problem_.objective.evaluate(found, even_norm());
   problem_.objective.gradient(step);
   restrict_to_free(problem_.constraints, step);
   problem_.precondition(step, step);
   found -= step;
+}
+
+LpNorm Multiresolution::even_norm() const {
+  return LpNorm(Material::uniform(2), problem_.shape().vertex_count(), 1, 1);
 }
 
 std::optional<Points> Multiresolution::intermediate_state(bool is_last) {
@@ -174,6 +178,7 @@ bool Multiresolution::begin_graded(const std::vector<char>& stays) {
   if (stays.empty()) return false;
   const bool is_early = grading_->is_early;
   objective_ = problem_.objective.sum(problem_.norm);
+  if (problem_.constraints.linear.empty()) problem_.metric.release();  // the fine level factors it again
   const FineInputs inputs{problem_.shape(), grading_->handles, problem_.constraints, grading_->material, 1};
   graded_ = GradedLevel::create(inputs, x_, stays, grading_->make_solver, problem_.stop);
   end_grading();
@@ -208,14 +213,15 @@ void Multiresolution::leave_fine() {
   if (!begin_graded(stays)) fine_ = std::make_unique<QuasiNewton>(problem_, std::move(x_), warmth_of_fine());
 }
 
-/// x, moved along with the graded level, and evened out if that lowers its energy. Not always finite.
+/// x, moved along with the graded level, and evened out if that lowers its energy. Not always finite. Weights of p > 2 differ too much for
+/// sweeps.
 Points Multiresolution::moved_with_graded() const {
   Points found = graded_->moved(problem_.shape(), x_, problem_.workers());
   make_feasible(found);
   if (!found.allFinite()) return found;
   const double objective = problem_.objective.evaluate(found, problem_.norm);
   Points even = found;
-  even_out(even);
+  relax(problem_, problem_.norm.highest_p() > 2 ? even_norm() : problem_.norm, kSweeps, even);
   if (even.allFinite() && problem_.objective.evaluate(even, problem_.norm) < objective) return even;
   return found;
 }

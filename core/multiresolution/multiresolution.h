@@ -59,6 +59,7 @@ class Multiresolution : public Minimiser {
   Points prolonged();
   void make_feasible(Points& found) const;
   void even_out(Points& found) const;
+  LpNorm even_norm() const;
   bool begin_to_ease();
   bool begin_graded(const std::vector<char>& stays);
   std::vector<char> chosen_for_graded();

@@ -188,6 +188,26 @@ TEST_F(MetricTest, GivesTheDoubleFactorBackWhenItIsNotWanted) {
   EXPECT_LT((refined - exact).norm(), 1e-11 * exact.norm());
 }
 
+TEST_F(MetricTest, FactorsAgainAfterItWasReleased) {
+  for (const auto precision : {Metric::Precision::kSingle, Metric::Precision::kDouble}) {
+    ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1), precision));
+    Points b = Points::Random(shape->vertex_count(), 3), before, after;
+    clear_held(b);
+    metric.solve(b, before, Workers(1));
+    const std::size_t bytes = metric.memory_bytes();
+    metric.release();
+    EXPECT_LT(metric.memory_bytes(), bytes - shape->neighbours().size() / 2 * sizeof(float));
+    EXPECT_FALSE(metric.is_factored_for(is_held));
+    EXPECT_GT(metric.cell_weight(0), 0);
+    const auto version = metric.version();
+    ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1), precision));
+    EXPECT_NE(metric.version(), version);
+    EXPECT_TRUE(metric.is_factored_for(is_held));
+    metric.solve(b, after, Workers(1));
+    EXPECT_EQ(before, after);
+  }
+}
+
 TEST_F(MetricTest, HoldsTheMatrixBesideASingleFactorOnlyAfterASolve) {
   ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1)));
   const std::size_t before = metric.memory_bytes();

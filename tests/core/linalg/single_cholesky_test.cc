@@ -88,6 +88,21 @@ TEST(SingleCholesky, FactorsOtherValuesOfThePattern) {
   EXPECT_LT((first - 4 * second).cwiseAbs().maxCoeff(), 1e-6);
 }
 
+TEST(SingleCholesky, FactorsAgainAfterItsValuesHaveBeenFreed) {
+  const LowerMatrix matrix = square_laplacian(40);
+  SingleCholesky single = analysed(matrix);
+  Points b = Points::Random(1600, 3), before, after;
+  ASSERT_TRUE(single.factor(RowsOf(matrix), Workers(2)));
+  single.result().solve(b, before, Workers(1));
+  const std::size_t bytes = single.memory_bytes();
+  single.free_values();
+  EXPECT_LT(single.memory_bytes(), bytes - matrix.rows.size() * sizeof(float));
+  ASSERT_TRUE(single.factor(RowsOf(matrix), Workers(2)));
+  single.result().solve(b, after, Workers(1));
+  EXPECT_EQ(before, after);
+  EXPECT_EQ(single.memory_bytes(), bytes);
+}
+
 TEST(SingleCholesky, RefusesWhatSinglePrecisionDoesNotCarry) {
   for (const double wrong :
        {-1.0, 0.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e60}) {

@@ -153,7 +153,51 @@ TEST_F(KinksTest, GivesTheSameBitsOnAnyNumberOfThreads) {
 class KinksAtTwoTest : public KinksTest {
  protected:
   KinksAtTwoTest() : KinksTest(2) {}
+
+  Points relaxed(const Points& from, int sweeps, int threads = 1) {
+    const Problem made = problem(threads);
+    objective->set_soft_terms(constraints.soft);
+    objective->evaluate(from, norm);
+    Points x = from;
+    relax(made, norm, sweeps, x);
+    return x;
+  }
 };
+
+TEST_F(KinksAtTwoTest, SweepsTakeKinksAwayAndLeaveTheRest) {
+  const Points x = relaxed(kinked, 3);
+  const double least = energy(smooth);
+  EXPECT_GT(energy(kinked), 1.5 * least);
+  EXPECT_LT(energy(x) - least, 0.2 * (energy(kinked) - least));
+  EXPECT_LT((relaxed(smooth, 3) - smooth).cwiseAbs().maxCoeff(), 0.02);
+  for (const std::int32_t i : constraints.exact.vertices) EXPECT_EQ(x.row(i), kinked.row(i));
+}
+
+TEST_F(KinksAtTwoTest, SweepsGiveTheSameBitsOnAnyNumberOfThreads) {
+  EXPECT_EQ(relaxed(kinked, 3, 1), relaxed(kinked, 3, 2));
+}
+
+TEST_F(KinksAtTwoTest, WhoHasStoppedGetsNoSweep) {
+  std::stop_source source;
+  source.request_stop();
+  stop = source.get_token();
+  EXPECT_EQ(relaxed(kinked, 3), kinked);
+}
+
+/// A handle that pulls a thousand times as hard as the surface.
+TEST_F(KinksAtTwoTest, SweepsAllowForSoftTerms) {
+  Handle soft{{at(80, 80), at(81, 80)}, turn(Eigen::Vector3d::UnitZ(), 0, {0, 0, 0}, {0, 0, 0.1})};
+  soft.hold = Soft{1000};
+  ASSERT_TRUE(handles.set("soft", soft).ok());
+  constraints = make_constraints(*shape, handles, FreeComponents::kError).value();
+  const Points x = relaxed(smooth, 20);
+  const double before = [&] {
+    (void)problem();
+    objective->set_soft_terms(constraints.soft);
+    return objective->evaluate(smooth, norm);
+  }();
+  EXPECT_LT(objective->evaluate(x, norm), 0.9 * before);
+}
 
 TEST_F(KinksAtTwoTest, AtTwoNothingIsEased) {
   expect_stays(kinked);
