@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include "core/base/check.h"
+
 namespace lpdeform {
 namespace {
 
@@ -221,6 +223,7 @@ void Metric::subtract_product(const Points& x, Points& b) const {
 
 const SingleFactor& Metric::single() const {
   if (is_single_current_) return single_.result();
+  LPDEFORM_CHECK(double_);  // not after release()
   if (copy_.empty()) double_->copy_to(copy_);
   return copy_;
 }

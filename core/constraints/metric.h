@@ -67,6 +67,8 @@ class Metric {
 
   /// Frees the factor's values, most of memory_bytes(). Until the next factor(), is_factored_for() is false, and nothing may be solved.
   void release();
+  /// What the next factor() allocates again after release(), in single precision; else 0.
+  std::size_t released_bytes() const { return single_.freed_bytes(); }
 
   /// Whether the last factor() was for these held vertices and succeeded, and its factor has not been released.
   bool is_factored_for(const std::vector<char>& is_held) const { return is_good_ && is_held == is_held_; }

@@ -28,6 +28,7 @@ class SingleCholesky {
   const SingleFactor& result() const { return factor_; }
   /// Frees the values of the factor until the next factor().
   void free_values() { factor_.free_values(); }
+  std::size_t freed_bytes() const { return factor_.freed_bytes(); }
 
   std::size_t memory_bytes() const;
 

@@ -34,12 +34,16 @@ float* SingleFactor::new_supernode(std::int32_t columns, const std::int32_t* row
   return values_.data() + supernodes_.back().first_value;
 }
 
-/// Makes room for the values if they have been freed.
-void SingleFactor::need_values() {
-  if (!values_.empty() || supernodes_.empty()) return;
+std::size_t SingleFactor::value_count() const {
+  if (supernodes_.empty()) return 0;
   const Supernode& last = supernodes_.back();
   const auto columns = static_cast<std::size_t>(last.columns);
-  values_.resize(last.first_value + columns * (columns + last.row_count));
+  return last.first_value + columns * (columns + last.row_count);
+}
+
+/// Makes room for the values if they have been freed.
+void SingleFactor::need_values() {
+  if (values_.empty()) values_.resize(value_count());
 }
 
 /// The supernode of each column.

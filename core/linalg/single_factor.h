@@ -43,6 +43,8 @@ class SingleFactor {
 
   /// Frees the values; the pattern stays.
   void free_values() { std::vector<float>().swap(values_); }
+  /// What they take if they have been freed; else 0.
+  std::size_t freed_bytes() const { return values_.empty() ? value_count() * sizeof(float) : 0; }
 
   bool empty() const { return new_to_old_.empty(); }
   /// Makes the factor empty; keeps the memory.
@@ -77,6 +79,7 @@ class SingleFactor {
   void solve_forward(std::int32_t first, std::int32_t last) const;
   void solve_backward(std::int32_t first, std::int32_t last) const;
   float* new_supernode(std::int32_t columns, const std::int32_t* rows, std::size_t row_count);
+  std::size_t value_count() const;
   void need_values();
 
   std::vector<std::int32_t> new_to_old_;

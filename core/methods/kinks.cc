@@ -129,8 +129,8 @@ std::vector<std::int32_t> kinked_cells(const Problem& problem, double all) {
   return cells;
 }
 
-/// The diagonal of the metric of the objective's last evaluation. Off-diagonal entries of soft terms count with their absolute values,
-/// so that a sweep stays within them.
+/// The diagonal of the metric of the objective's last evaluation. Off-diagonal entries of soft terms are added with their absolute
+/// values, so that a sweep does not overshoot.
 std::vector<double> metric_diagonal(const Problem& problem) {
   const RestShape& shape = problem.shape();
   const std::vector<double>& c = problem.objective.cells().cell_weights();
@@ -155,7 +155,7 @@ std::vector<double> metric_diagonal(const Problem& problem) {
 
 void relax(const Problem& problem, const LpNorm& norm, int sweeps, Points& x) {
   Points step;
-  for (int sweep = 0; sweep < sweeps && !problem.stop.stop_requested(); ++sweep) {
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
     if (sweep == 0)
       problem.objective.reweigh(norm);
     else

@@ -178,7 +178,9 @@ bool Multiresolution::begin_graded(const std::vector<char>& stays) {
   if (stays.empty()) return false;
   const bool is_early = grading_->is_early;
   objective_ = problem_.objective.sum(problem_.norm);
-  if (problem_.constraints.linear.empty()) problem_.metric.release();  // the fine level factors it again
+  // At a large p, where the level is large, it has the place of the fine level's factor, which is made again for other weights anyway.
+  const bool is_large = problem_.norm.highest_p() > 2;
+  if (is_large && problem_.constraints.linear.empty()) problem_.metric.release();
   const FineInputs inputs{problem_.shape(), grading_->handles, problem_.constraints, grading_->material, 1};
   graded_ = GradedLevel::create(inputs, x_, stays, grading_->make_solver, problem_.stop);
   end_grading();
@@ -213,8 +215,8 @@ void Multiresolution::leave_fine() {
   if (!begin_graded(stays)) fine_ = std::make_unique<QuasiNewton>(problem_, std::move(x_), warmth_of_fine());
 }
 
-/// x, moved along with the graded level, and evened out if that lowers its energy. Not always finite. Weights of p > 2 differ too much for
-/// sweeps.
+/// x, moved along with the graded level, and evened out if that lowers its energy. Not always finite. Where some p_i > 2, cell weights
+/// differ too much, and sweeps have equal ones.
 Points Multiresolution::moved_with_graded() const {
   Points found = graded_->moved(problem_.shape(), x_, problem_.workers());
   make_feasible(found);

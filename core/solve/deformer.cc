@@ -15,8 +15,8 @@
 namespace lpdeform {
 namespace {
 
-// What a running solve holds of each vertex, and the same while a graded level runs.
-constexpr std::size_t kWorkspace = QuasiNewton::kBytesPerVertex, kWorkspaceOfLevel = 9 * sizeof(double);
+// What a running solve holds of each vertex, and the same while a graded level runs: four states and a diagonal.
+constexpr std::size_t kWorkspace = QuasiNewton::kBytesPerVertex, kWorkspaceOfLevel = 13 * sizeof(double);
 // What a Deformer holds of each vertex besides: x, positions, x_before_move, energies and weights.
 constexpr std::size_t kStates = 12 * sizeof(double);
 constexpr std::size_t kCellBytes = 60, kEdgeBytes = 30;  // of CellPass: per vertex, per directed edge
@@ -309,7 +309,9 @@ std::vector<Eigen::Matrix3d> Deformer::rotations() {
 std::size_t Deformer::memory_bytes() const {
   const auto n = static_cast<std::size_t>(impl_->shape->vertex_count());
   const std::size_t levels = impl_->minimiser ? impl_->minimiser->level_bytes() : 0;
-  return idle_memory_bytes() + std::max(kWorkspace * n, kWorkspaceOfLevel * n + levels);
+  // What the fine level takes again after a graded level counts all the time, so that nobody else is promised it.
+  const std::size_t of_fine = kWorkspace * n + impl_->metric.released_bytes();
+  return idle_memory_bytes() + std::max(of_fine, kWorkspaceOfLevel * n + levels);
 }
 
 std::size_t Deformer::idle_memory_bytes() const {
