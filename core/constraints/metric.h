@@ -67,7 +67,7 @@ class Metric {
 
   /// Frees the factor's values, most of memory_bytes(). Until the next factor(), is_factored_for() is false, and nothing may be solved.
   void release();
-  /// What the next factor() allocates again after release(), in single precision; else 0.
+  /// What a factorisation in single precision allocates again after release(); 0 once there was one.
   std::size_t released_bytes() const { return single_.freed_bytes(); }
 
   /// Whether the last factor() was for these held vertices and succeeded, and its factor has not been released.

@@ -161,6 +161,7 @@ void relax(const Problem& problem, const LpNorm& norm, int sweeps, Points& x) {
     else
       problem.objective.evaluate(x, norm);
     problem.objective.gradient(step);
+    restrict_to_free(problem.constraints, step);  // without what holds points and locks
     const std::vector<double> diagonal = metric_diagonal(problem);
     problem.workers().for_chunks(diagonal.size(), kChunk,
                                  [&](std::size_t, std::size_t begin, std::size_t end) {

@@ -15,7 +15,8 @@ namespace lpdeform {
 /// problem.stop ends the sweeps.
 bool ease_kinks(const Problem& problem, Points& x);
 
-/// Evens a guess out by damped Jacobi sweeps: x -= w D^-1 g, with g the gradient of `norm` at x, soft terms included, D the diagonal of
+/// Evens a guess out by damped Jacobi sweeps: x -= w P D^-1 P g, with g the gradient of `norm` at x, soft terms included, P the
+/// projection on what the constraints allow, D the diagonal of
 /// its metric (Metric), and w = 2/3. To D are added the absolute values of what soft terms have off the diagonal. Unlike a step in the metric, it
 /// needs no factor, and takes away mainly what varies from one vertex to the next. It may raise the objective. problem.objective holds an
 /// evaluation at x when it is called; afterwards its evaluation is of another state. The constraints stay satisfied. problem.stop does

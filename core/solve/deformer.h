@@ -152,7 +152,7 @@ class Deformer {
   /// E_i at positions(), in the caller's unit of length; 0 for unreferenced vertices.
   const Field& cell_energies() const;
 
-  /// Bytes held while solving, without the shared rest shape.
+  /// Bytes held while solving, without the shared rest shape. With what a solve takes again of a factor that it has freed.
   std::size_t memory_bytes() const;
   /// Bytes held between solves.
   std::size_t idle_memory_bytes() const;

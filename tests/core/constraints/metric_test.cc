@@ -194,15 +194,20 @@ TEST_F(MetricTest, FactorsAgainAfterItWasReleased) {
     Points b = Points::Random(shape->vertex_count(), 3), before, after;
     clear_held(b);
     metric.solve(b, before, Workers(1));
+    EXPECT_EQ(metric.released_bytes(), 0u);
     const std::size_t bytes = metric.memory_bytes();
     metric.release();
     EXPECT_LT(metric.memory_bytes(), bytes - shape->neighbours().size() / 2 * sizeof(float));
     EXPECT_FALSE(metric.is_factored_for(is_held));
+    EXPECT_GT(metric.released_bytes(), 0u);
     EXPECT_GT(metric.cell_weight(0), 0);
     const auto version = metric.version();
     ASSERT_TRUE(metric.factor(cell_weights, is_held, {}, Workers(1), precision));
     EXPECT_NE(metric.version(), version);
     EXPECT_TRUE(metric.is_factored_for(is_held));
+    if (precision == Metric::Precision::kSingle) {
+      EXPECT_EQ(metric.released_bytes(), 0u);
+    }
     metric.solve(b, after, Workers(1));
     EXPECT_EQ(before, after);
   }

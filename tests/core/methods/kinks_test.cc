@@ -185,6 +185,19 @@ TEST_F(KinksAtTwoTest, AStopDoesNotEndTheSweeps) {
   EXPECT_EQ(relaxed(kinked, 3), expected);
 }
 
+/// Beside a point's reaction the rest of the gradient is zero.
+TEST_F(KinksAtTwoTest, SweepsLeaveAMinimumWithAPointAlone) {
+  Handle point;
+  point.points = {{static_cast<std::int32_t>(shape->faces().rows() / 3), {0.7, 0.2, 0.1}}};
+  point.motion = turn(Eigen::Vector3d::UnitZ(), 0, {0, 0, 0}, {0, 0, 3});
+  ASSERT_TRUE(handles.set("point", point).ok());
+  constraints = make_constraints(*shape, handles, FreeComponents::kError).value();
+  const auto solver = deformer(shape, handles, Material::uniform(2));
+  (void)solver->solve({.tolerance = 1e-7, .effort = 0});
+  const Points least = (solver->positions().rowwise() - shape->centre()) / shape->mean_edge_length();
+  EXPECT_LT((relaxed(least, 3) - least).cwiseAbs().maxCoeff(), 1e-3);
+}
+
 /// Handles that pull a thousand times as hard as the surface.
 TEST_F(KinksAtTwoTest, SweepsAllowForSoftTerms) {
   Handle vertices{{at(80, 80), at(81, 80)}, turn(Eigen::Vector3d::UnitZ(), 0, {0, 0, 0}, {0, 0, 0.1})};
