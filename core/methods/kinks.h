@@ -15,12 +15,16 @@ namespace lpdeform {
 /// problem.stop ends the sweeps.
 bool ease_kinks(const Problem& problem, Points& x);
 
-/// Evens a guess out by damped Jacobi sweeps: x -= w P D^-1 P g, with g the gradient of `norm` at x, soft terms included, P the
-/// projection on what the constraints allow, D the diagonal of
-/// its metric (Metric), and w = 2/3. To D are added the absolute values of what soft terms have off the diagonal. Unlike a step in the metric, it
-/// needs no factor, and takes away mainly what varies from one vertex to the next. It may raise the objective. problem.objective holds an
-/// evaluation at x when it is called; afterwards its evaluation is of another state. The constraints stay satisfied. problem.stop does
-/// not end it. The same bits on any number of threads.
+/// Evens a guess out by damped Jacobi sweeps:
+///
+///   x -= w P D^-1 P g
+///
+/// g is the gradient of `norm` at x, soft terms included, and P the projection on what the constraints allow. D is the diagonal of the
+/// metric of `norm` (Metric), plus the absolute values of what soft terms have off the diagonal. w is 2/3. Unlike a step in the metric, a
+/// sweep needs no factor, and takes away mainly what varies from one vertex to the next. It may raise the objective.
+///
+/// problem.objective holds an evaluation at x when it is called; afterwards its evaluation is of another state. The constraints stay
+/// satisfied. problem.stop does not end it. The same bits on any number of threads.
 void relax(const Problem& problem, const LpNorm& norm, int sweeps, Points& x);
 
 }  // namespace lpdeform

@@ -178,9 +178,9 @@ bool Multiresolution::begin_graded(const std::vector<char>& stays) {
   if (stays.empty()) return false;
   const bool is_early = grading_->is_early;
   objective_ = problem_.objective.sum(problem_.norm);
-  // At a large p, where the level is large, it has the place of the fine level's factor, which is made again for other weights anyway.
-  const bool is_large = problem_.norm.highest_p() > 2;
-  if (is_large && problem_.constraints.linear.empty()) problem_.metric.release();
+  // Where some p_i > 2, the level is large. The fine level's factor is freed for it, and made again for other weights afterwards anyway.
+  const bool has_large_p = problem_.norm.highest_p() > 2;
+  if (has_large_p && problem_.constraints.linear.empty()) problem_.metric.release();
   const FineInputs inputs{problem_.shape(), grading_->handles, problem_.constraints, grading_->material, 1};
   graded_ = GradedLevel::create(inputs, x_, stays, grading_->make_solver, problem_.stop);
   end_grading();

@@ -47,8 +47,8 @@ class Multiresolution : public Minimiser {
   StepResult step() override;
   const Points& x() const override { return fine_ ? fine_->x() : x_; }
   std::size_t level_bytes() const override { return graded_ ? graded_->memory_bytes() : 0; }
-  /// The prolonged state of the coarse or the graded level. This costs about as much as three iterations, or five, so there is a new one only
-  /// when four times that time has passed since the previous one, or if it is the last.
+  /// The prolonged state of the coarse or the graded level. This costs about as much as three iterations, or five on a graded level. So
+  /// there is a new one only when four times that time has passed since the previous one, or if it is the last.
   std::optional<Points> intermediate_state(bool is_last) override;
 
  private:
