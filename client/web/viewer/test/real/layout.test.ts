@@ -1,5 +1,5 @@
 import { join } from "node:path";
-import { afterAll, beforeAll, expect, it } from "vitest";
+import { afterAll, beforeAll, beforeEach, expect, it } from "vitest";
 import { Service } from "../../../client/test/support/service.js";
 import { sizes } from "../support/sizes.js";
 import { undrawn, User } from "./user.js";
@@ -11,18 +11,33 @@ let user: User;
 /** The same page under fingers, where what is pressed is larger. */
 let touching: User;
 
-beforeAll(async () => {
-  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
+async function openBoth() {
   user = await User.open(`${service.url}/?shape=bar&detail=coarse`, { args: undrawn });
   await user.settled();
   touching = await User.open(`${service.url}/?shape=bar&detail=coarse`, { hasTouch: true, args: undrawn });
   await touching.settled();
-});
+}
 
-afterAll(async () => {
+async function closeBoth() {
   expect([...user.errors, ...touching.errors]).toEqual([]);
   await user.close();
   await touching.close();
+}
+
+beforeAll(async () => {
+  service = await Service.start({ files: join(import.meta.dirname, "../../dist") });
+  await openBoth();
+});
+
+// A test is repeated only where the browser has stopped drawing (vitest.config.ts). That browser does not begin again.
+beforeEach(async ({ task }) => {
+  if (!task.result?.retryCount) return;
+  await closeBoth();
+  await openBoth();
+});
+
+afterAll(async () => {
+  await closeBoth();
   await service.stop();
 });
 
