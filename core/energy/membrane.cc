@@ -9,6 +9,12 @@ namespace lpdeform {
 namespace {
 
 constexpr std::size_t kChunk = 1024;  // faces or vertices
+constexpr std::size_t kLanes = MembraneFaces::kLanes;
+
+/// The face of a row of MembraneFaces::derivatives.
+std::size_t face_of(std::size_t row) {
+  return row / (2 * kLanes) * kLanes + row % kLanes;
+}
 
 /// The faces at marked vertices.
 std::optional<Faces> faces_at(const Faces& all, const std::vector<char>& cells) {
@@ -47,15 +53,25 @@ Membrane::Membrane(std::shared_ptr<const RestShape> shape, const Workers& worker
       faces_.area[t] = twice / 2;
     }
   });
-  offsets_.assign(static_cast<std::size_t>(shape_->vertex_count()) + 1, 0);
+  const auto vertices = static_cast<std::size_t>(shape_->vertex_count());
+  // Of each vertex: the faces whose first corner it is, and its other faces.
+  std::vector<std::int32_t> firsts(vertices, 0), others(vertices, 0);
   for (Eigen::Index t = 0; t < faces.rows(); ++t) {
-    for (int c = 0; c < 3; ++c) ++offsets_[faces(t, c) + 1];
+    ++firsts[faces(t, 0)];
+    ++others[faces(t, 1)], ++others[faces(t, 2)];
   }
-  for (std::size_t i = 1; i < offsets_.size(); ++i) offsets_[i] += offsets_[i - 1];
-  places_.resize(3 * count);
-  std::vector<std::int32_t> next(offsets_.begin(), offsets_.end() - 1);
+  offsets_.assign(2 * vertices + 1, 0);
+  for (std::size_t i = 0; i < vertices; ++i) {
+    offsets_[2 * i + 1] = offsets_[2 * i] + firsts[i];
+    offsets_[2 * i + 2] = offsets_[2 * i + 1] + others[i];
+    firsts[i] = offsets_[2 * i], others[i] = offsets_[2 * i + 1];  // where the next one goes
+  }
+  rows_.resize(3 * count);
   for (Eigen::Index t = 0; t < faces.rows(); ++t) {
-    for (int c = 0; c < 3; ++c) places_[next[faces(t, c)]++] = static_cast<std::int32_t>(3 * t + c);
+    const std::size_t row = MembraneFaces::row_of_derivative(static_cast<std::size_t>(t), 0);
+    rows_[firsts[faces(t, 0)]++] = static_cast<std::int32_t>(row);
+    rows_[others[faces(t, 1)]++] = static_cast<std::int32_t>(row);
+    rows_[others[faces(t, 2)]++] = static_cast<std::int32_t>(row + kLanes);
   }
 }
 
@@ -68,7 +84,8 @@ void Membrane::evaluate(const double* rows, const Workers& workers) {
 
 double Membrane::share(std::int32_t i) const {
   double sum = 0;
-  for (std::int32_t k = offsets_[i]; k < offsets_[i + 1]; ++k) sum += faces_.squared[places_[k] / 3];
+  for (std::int32_t k = offsets_[2 * i]; k < offsets_[2 * i + 2]; ++k)
+    sum += faces_.squared[face_of(rows_[k])];
   return sum / 3;
 }
 
@@ -82,18 +99,19 @@ void Membrane::add_gradient(const std::vector<double>& c, const Workers& workers
       weights_[t] = (c[faces(row, 0)] + c[faces(row, 1)] + c[faces(row, 2)]) / 3;
     }
   });
-  const auto derivative = [&](std::size_t t, std::size_t corner) -> const SingleRow& {
-    return *reinterpret_cast<const SingleRow*>(faces_.derivatives.data() +
-                                               MembraneFaces::place_of_derivative(t, corner));
-  };
+  const auto* const derivatives = reinterpret_cast<const SingleRow*>(faces_.derivatives.data());
   workers.for_chunks(c.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
+      const std::int32_t begin_of_own = offsets_[2 * i + 1], end_of_own = offsets_[2 * i + 2];
       Row sum{};
-      for (std::int32_t k = offsets_[i]; k < offsets_[i + 1]; ++k) {
-        const auto t = static_cast<std::size_t>(places_[k] / 3);
-        const std::int32_t corner = places_[k] % 3;
-        const SingleRow own = corner == 0 ? -derivative(t, 0) - derivative(t, 1) : derivative(t, corner - 1);
-        sum += weights_[t] * __builtin_convertvector(own, Row);
+      for (std::int32_t k = offsets_[2 * i]; k < begin_of_own; ++k) {
+        const auto row = static_cast<std::size_t>(rows_[k]);
+        const SingleRow of_others = derivatives[row] + derivatives[row + kLanes];  // minus the first corner's
+        sum -= weights_[face_of(row)] * __builtin_convertvector(of_others, Row);
+      }
+      for (std::int32_t k = begin_of_own; k < end_of_own; ++k) {
+        const auto row = static_cast<std::size_t>(rows_[k]);
+        sum += weights_[face_of(row)] * __builtin_convertvector(derivatives[row], Row);
       }
       for (int e = 0; e < 3; ++e) result(static_cast<Eigen::Index>(i), e) += sum[e];
     }
@@ -102,7 +120,7 @@ void Membrane::add_gradient(const std::vector<double>& c, const Workers& workers
 
 std::size_t Membrane::memory_bytes() const {
   return faces_.memory_bytes() + weights_.capacity() * sizeof(double) +
-         (offsets_.capacity() + places_.capacity()) * sizeof(std::int32_t) +
+         (offsets_.capacity() + rows_.capacity()) * sizeof(std::int32_t) +
          (some_ ? some_->size() * sizeof(std::int32_t) : 0);
 }
 

@@ -39,8 +39,10 @@ class Membrane {
   std::shared_ptr<const RestShape> shape_;
   std::optional<Faces> some_;  // the faces, unless it has all
   MembraneFaces faces_;
-  mutable std::vector<double> weights_;         // of each face, in add_gradient()
-  std::vector<std::int32_t> offsets_, places_;  // of each vertex: 3 * face + corner
+  mutable std::vector<double> weights_;  // of each face, in add_gradient()
+  // Rows of derivatives. Those at offsets_[2 i] to offsets_[2 i + 1] - 1 are of the faces whose first corner is vertex i. They are the
+  // second corner's. Those up to offsets_[2 i + 2] - 1 are vertex i's own, as another corner.
+  std::vector<std::int32_t> offsets_, rows_;
 };
 
 }  // namespace lpdeform

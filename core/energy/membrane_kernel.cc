@@ -54,7 +54,7 @@ HWY_INLINE void evaluate_lanes(const std::int32_t (&corner)[3][kLanes], std::siz
   const V size = hn::Mul(hn::Set(d, 4.0), area), along = hn::Mul(size, hn::Sub(one, over)),
           across = hn::Neg(hn::Mul(size, k));
   const Vector by_f = sum_of(along, f, across, cross(g, n)), by_g = sum_of(along, g, across, cross(n, f));
-  float* const derivatives = faces.derivatives.data() + MembraneFaces::place_of_derivative(first, 0);
+  float* const derivatives = faces.derivatives.data() + MembraneFaces::row_of_derivative(first, 0) * kRow;
   store_rows(sum_of(i00, by_f, i01, by_g), derivatives);
   store_rows(scaled(i11, by_g), derivatives + kLanes * kRow);
 }

@@ -24,9 +24,9 @@ struct MembraneFaces {
   std::vector<float>
       derivatives;  // dE_T^2: [face / kLanes][second or third corner][face % kLanes][axis, filler]
 
-  /// The place in `derivatives` where the numbers of the second (`corner` 0) or third corner (1) of face t begin.
-  static std::size_t place_of_derivative(std::size_t t, std::size_t corner) {
-    return ((t / kLanes * 2 + corner) * kLanes + t % kLanes) * kRow;
+  /// The row of `derivatives`, of kRow numbers, that the second (`corner` 0) or third corner (1) of face t has.
+  static std::size_t row_of_derivative(std::size_t t, std::size_t corner) {
+    return (t / kLanes * 2 + corner) * kLanes + t % kLanes;
   }
 };
 

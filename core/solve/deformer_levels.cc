@@ -20,6 +20,7 @@ constexpr std::int32_t kLargestSearchedLevel =
 // Minima of a coarse level that differ by less than this may be in another order on the fine level. It counts where the fine
 // level is too large to be searched itself.
 constexpr double kLeastSavingOfLevel = 0.02;
+constexpr std::int32_t kVerticesAThread = 800;                             // of a level: see DeformerOptions
 constexpr std::int32_t kNever = std::numeric_limits<std::int32_t>::max();  // vertices
 // See can_compare_guesses. At p = 1, where kinks move, going alone is not nearer to the minimum in the same time.
 constexpr double kLeastPToCompare = 1.1;
@@ -68,6 +69,7 @@ MakeLevelSolver Deformer::Impl::level_maker(bool is_graded) const {
   return [this, is_graded](std::shared_ptr<const RestShape> level) -> std::unique_ptr<LevelSolver> {
     const DeformerOptions of_level{.free_components = FreeComponents::kStay,
                                    .threads = workers().threads(),
+                                   .vertices_a_thread = kVerticesAThread,
                                    .search_up_to = kLargestSearchedLevel,
                                    .least_saving = is_large() ? kLeastSavingOfLevel : 0,
                                    .graded_from = kNever,
