@@ -30,6 +30,26 @@ Field restricted(const Field& field, const std::vector<std::int32_t>& fine_verte
   return result;
 }
 
+/// A cell is thin where the second eigenvalue of sum_j w_ij (p_i - p_j)^T (p_i - p_j) is less than this share of the largest. Its edges
+/// then hardly tell how it has turned about its longest direction. At a corner that is in one face only, one of them may weigh nothing.
+constexpr double kThin = 1e-3;
+
+std::vector<char> thin_cells(const RestShape& shape) {
+  const Points& rest = shape.scaled_positions();
+  std::vector<char> result(static_cast<std::size_t>(shape.vertex_count()));
+  for (std::int32_t i = 0; i < shape.vertex_count(); ++i) {
+    Eigen::Matrix3d b = Eigen::Matrix3d::Zero();
+    for (std::int32_t k = shape.offsets()[i]; k < shape.offsets()[i + 1]; ++k) {
+      const Eigen::RowVector3d edge = rest.row(i) - rest.row(shape.neighbours()[k]);
+      b.noalias() += shape.weights()[k] * edge.transpose() * edge;
+    }
+    const double squared = b.trace() * b.trace();
+    const double pairs = (squared - b.squaredNorm()) / 2;  // the sum of products of two eigenvalues
+    result[static_cast<std::size_t>(i)] = pairs > kThin * squared ? 0 : 1;
+  }
+  return result;
+}
+
 double at(const Field& field, Eigen::Index i) {
   return field.size() == 1 ? field[0] : field[i];
 }
@@ -60,11 +80,13 @@ std::unique_ptr<CoarseLevel> CoarseLevel::create(const RestShape& fine, CoarseMe
 }
 
 /// Finds the guides of each fine vertex: of the coarse vertex that it was collapsed into and that vertex's neighbours,
-/// the nearest kGuides. They are weighted so that the weight of the next nearest would be 0.
+/// the nearest kGuides. They are weighted so that the weight of the next nearest would be 0. Thin cells guide only where there
+/// are no others.
 void CoarseLevel::find_guides(const RestShape& fine) {
   const double unit = shape_->mean_edge_length() / fine.mean_edge_length();
   const double least = 1e-3 * unit;
   guides_.resize(coarse_vertex_.size());
+  const std::vector<char> is_thin = thin_cells(*shape_);
   std::vector<std::pair<double, std::int32_t>> near;
   for (std::size_t v = 0; v < coarse_vertex_.size(); ++v) {
     const std::int32_t own = coarse_vertex_[v];
@@ -77,6 +99,8 @@ void CoarseLevel::find_guides(const RestShape& fine) {
     for (std::int32_t k = shape_->offsets()[own]; k < shape_->offsets()[own + 1]; ++k) {
       near.emplace_back(distance(shape_->neighbours()[k]), shape_->neighbours()[k]);
     }
+    const auto tells_little = [&](const auto& guide) { return is_thin[guide.second] != 0; };
+    if (!std::all_of(near.begin(), near.end(), tells_little)) std::erase_if(near, tells_little);
     std::sort(near.begin(), near.end());
     const double farthest = near.size() > kGuides ? near[kGuides].first : near.back().first * 1.5 + unit;
     Guides guides{};
