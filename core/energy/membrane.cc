@@ -53,25 +53,21 @@ Membrane::Membrane(std::shared_ptr<const RestShape> shape, const Workers& worker
       faces_.area[t] = twice / 2;
     }
   });
-  const auto vertices = static_cast<std::size_t>(shape_->vertex_count());
-  // Of each vertex: the faces whose first corner it is, and its other faces.
-  std::vector<std::int32_t> firsts(vertices, 0), others(vertices, 0);
+  const auto part = [&](Eigen::Index t, int c) {
+    return 2 * static_cast<std::size_t>(faces(t, c)) + (c == 0 ? 0 : 1);
+  };
+  offsets_.assign(2 * static_cast<std::size_t>(shape_->vertex_count()) + 1, 0);
   for (Eigen::Index t = 0; t < faces.rows(); ++t) {
-    ++firsts[faces(t, 0)];
-    ++others[faces(t, 1)], ++others[faces(t, 2)];
+    for (int c = 0; c < 3; ++c) ++offsets_[part(t, c) + 1];
   }
-  offsets_.assign(2 * vertices + 1, 0);
-  for (std::size_t i = 0; i < vertices; ++i) {
-    offsets_[2 * i + 1] = offsets_[2 * i] + firsts[i];
-    offsets_[2 * i + 2] = offsets_[2 * i + 1] + others[i];
-    firsts[i] = offsets_[2 * i], others[i] = offsets_[2 * i + 1];  // where the next one goes
-  }
+  for (std::size_t i = 1; i < offsets_.size(); ++i) offsets_[i] += offsets_[i - 1];
   rows_.resize(3 * count);
+  std::vector<std::int32_t> next(offsets_.begin(), offsets_.end() - 1);
   for (Eigen::Index t = 0; t < faces.rows(); ++t) {
-    const std::size_t row = MembraneFaces::row_of_derivative(static_cast<std::size_t>(t), 0);
-    rows_[firsts[faces(t, 0)]++] = static_cast<std::int32_t>(row);
-    rows_[others[faces(t, 1)]++] = static_cast<std::int32_t>(row);
-    rows_[others[faces(t, 2)]++] = static_cast<std::int32_t>(row + kLanes);
+    for (int c = 0; c < 3; ++c) {
+      const std::size_t row = MembraneFaces::row_of_derivative(static_cast<std::size_t>(t), c == 2 ? 1 : 0);
+      rows_[next[part(t, c)]++] = static_cast<std::int32_t>(row);
+    }
   }
 }
 

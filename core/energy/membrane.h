@@ -40,8 +40,8 @@ class Membrane {
   std::optional<Faces> some_;  // the faces, unless it has all
   MembraneFaces faces_;
   mutable std::vector<double> weights_;  // of each face, in add_gradient()
-  // Rows of derivatives. Those at offsets_[2 i] to offsets_[2 i + 1] - 1 are of the faces whose first corner is vertex i. They are the
-  // second corner's. Those up to offsets_[2 i + 2] - 1 are vertex i's own, as another corner.
+  // From rows_[offsets_[2 i]] on: the row of derivatives of the second corner of each face whose first corner is vertex i. From
+  // rows_[offsets_[2 i + 1]] on: that of vertex i itself in each of its other faces.
   std::vector<std::int32_t> offsets_, rows_;
 };
 

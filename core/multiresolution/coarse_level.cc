@@ -30,9 +30,10 @@ Field restricted(const Field& field, const std::vector<std::int32_t>& fine_verte
   return result;
 }
 
-/// A cell is thin where the second eigenvalue of sum_j w_ij (p_i - p_j)^T (p_i - p_j) is less than this share of the largest. Its edges
-/// then hardly tell how it has turned about its longest direction. At a corner that is in one face only, one of them may weigh nothing.
-constexpr double kThin = 1e-3;
+/// A cell is thin if all its edges that weigh something lie in one line: if l_1 l_2 + l_1 l_3 + l_2 l_3 <= kThin (l_1 + l_2 + l_3)^2 ,
+/// l_k the eigenvalues of sum_j w_ij (p_i - p_j)^T (p_i - p_j). How it has turned about that line is left to rounding. A corner that is in
+/// one face only has two edges. Where that face has a right or an obtuse angle at another corner, one of them weighs nothing.
+constexpr double kThin = 1e-6;
 
 std::vector<char> thin_cells(const RestShape& shape) {
   const Points& rest = shape.scaled_positions();
@@ -44,7 +45,7 @@ std::vector<char> thin_cells(const RestShape& shape) {
       b.noalias() += shape.weights()[k] * edge.transpose() * edge;
     }
     const double squared = b.trace() * b.trace();
-    const double pairs = (squared - b.squaredNorm()) / 2;  // the sum of products of two eigenvalues
+    const double pairs = (squared - b.squaredNorm()) / 2;  // l_1 l_2 + l_1 l_3 + l_2 l_3
     result[static_cast<std::size_t>(i)] = pairs > kThin * squared ? 0 : 1;
   }
   return result;
@@ -303,7 +304,7 @@ Points CoarseLevel::prolong(const RestShape& fine, const Workers& workers) const
 }
 
 bool CoarseLevel::can_bend_like_fine() const {
-  return (bending_ < 1 || static_cast<std::int32_t>(coarse_vertex_.size()) >= kLeastEased) &&
+  return (is_fine_eased() || static_cast<std::int32_t>(coarse_vertex_.size()) >= kLeastEased) &&
          shape_->weight_kind() != WeightKind::kUniform;
 }
 

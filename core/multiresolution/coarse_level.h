@@ -81,6 +81,8 @@ class CoarseLevel {
   /// Lets the coarse solver's cells resist bending as the fine level does: multiplies their share by coarse vertices / fine
   /// vertices, until the next take_over(). Only if can_bend_like_fine().
   void bend_like_fine();
+  /// Whether the fine level is a level itself, whose cells bend like those of a finer one.
+  bool is_fine_eased() const { return bending_ < 1; }
   /// Whether the coarse level is large enough to begin, with cells that bend like the fine level's, on a level below it.
   bool has_level_below() const { return shape_->vertex_count() >= kLeastEasedLevel; }
 

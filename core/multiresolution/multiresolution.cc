@@ -144,8 +144,10 @@ bool Multiresolution::begin_to_ease() {
   SolveSettings settings;
   settings.initial = InitialGuess::kCurrent;
   settings.method = Method::kQuasiNewton;
-  settings.tolerance =
-      level_.has_level_below() ? std::max(problem_.tolerance, kEasedTolerance) : kLowestTolerance;
+  // Where the fine level has easy bends itself, its tolerance is kGentleTolerance. At p > 2 this level could end on a plateau with it.
+  const bool is_tight = level_.is_fine_eased() && problem_.norm.highest_p() > 2;
+  const double eased = is_tight ? kEasedTolerance : std::max(problem_.tolerance, kEasedTolerance);
+  settings.tolerance = level_.has_level_below() ? eased : kLowestTolerance;
   settings.effort = 0;
   return level_.solver().start(settings, problem_.stop).ok();
 }

@@ -19,9 +19,9 @@ async function openBoth() {
 }
 
 async function closeBoth() {
-  expect([...user.errors, ...touching.errors]).toEqual([]);
   await user.close();
   await touching.close();
+  expect([...user.errors, ...touching.errors]).toEqual([]);
 }
 
 beforeAll(async () => {
@@ -29,7 +29,7 @@ beforeAll(async () => {
   await openBoth();
 });
 
-// A test is repeated only where the browser has stopped drawing (vitest.config.ts). That browser does not begin again.
+// A test is repeated only where the browser has stopped drawing (vitest.config.ts). It never draws again, so the test gets other ones.
 beforeEach(async ({ task }) => {
   if (!task.result?.retryCount) return;
   await closeBoth();
@@ -37,8 +37,7 @@ beforeEach(async ({ task }) => {
 });
 
 afterAll(async () => {
-  await closeBoth();
-  await service.stop();
+  await closeBoth().finally(() => service.stop());
 });
 
 const states = [false, true].flatMap((isSplit) =>
