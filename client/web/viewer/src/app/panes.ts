@@ -60,7 +60,9 @@ export class Panes {
 
   removeSecond(): void {
     if (this.all.length < 2) return;
-    this.all.pop()!.close();
+    const second = this.all.pop()!;
+    second.close();
+    if (this.#turned === second) this.#turned = undefined;
     this.#split();
   }
 
