@@ -16,7 +16,8 @@ namespace {
     std::thread([log, written] {
       log->warning("end_forced", {{"text",
                                    "A thread did not end in time, for example because a disk does not "
-                                   "answer. The process ends now."}});
+                                   "answer, or because the matrix of a large mesh is being factored. "
+                                   "The process ends now."}});
       log->end();
       written->set_value();
     }).detach();

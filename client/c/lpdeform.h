@@ -617,9 +617,9 @@ LPDEFORM_API lpdeform_code lpdeform_settle(lpdeform_session* session, double tim
 typedef struct lpdeform_search {
   uint32_t struct_size;
   uint32_t minima_capacity; /* how many numbers `minima` has room for */
-  /* Receives the energies at which starts have converged, in order, as many as there is room for: the first minimum, then
-   * those of the search for lower ones. Several starts may converge to the same minimum. frame.energy is the lowest. May
-   * be NULL with minima_capacity 0. */
+  /* Receives the energies of minima, in order, as many as there is room for: the first one, then one for each start of the
+   * search for lower ones that has converged, or has come back to the lowest minimum, whose energy it then has. Several starts
+   * may come to the same minimum. frame.energy is the lowest. May be NULL with minima_capacity 0. */
   double* minima;
   /* How many energies there are, also if it is more than minima_capacity: up to 1 + further_starts. 0 if a limit has ended
    * the solve before the first minimum, and with a server that is older than the search. */

@@ -34,8 +34,8 @@ struct LpdeformShape {
   std::vector<std::uint32_t> indices;  // three per triangle
 };
 
-/// A session for an engine's component, in C++17 around lpdeform.h. No function waits for the network, except the destructor, for
-/// at most about two seconds. The constructor throws std::runtime_error; later errors are texts.
+/// A session for an engine's component, in C++17 around lpdeform.h. No function waits for the network, except take_better_shape(), and
+/// the destructor, for at most about two seconds. The constructor throws std::runtime_error; later errors are texts.
 class LpdeformFollower {
  public:
   LpdeformFollower(const LpdeformServer& server, const LpdeformSpace& space, const LpdeformShape& shape) {
@@ -155,12 +155,22 @@ class LpdeformFollower {
   /// The last thing that went wrong, once; empty where nothing did.
   std::string problem() { return std::exchange(problem_, {}); }
 
-  /// What the server says of itself or of a better shape, once when it changes; otherwise empty.
+  /// What the server says of itself or of a better shape, once when it changes; otherwise empty. A still better shape is a change.
   std::string notice() {
     char text[512] = "";
     const lpdeform_notice now = lpdeform_session_notice(session_, text, sizeof text);
-    return std::exchange(noticed_, now) == now ? std::string() : std::string(text);
+    lpdeform_better_shape better{};
+    better.struct_size = sizeof better;
+    if (now == LPDEFORM_NOTICE_BETTER_SHAPE) lpdeform_session_better_shape(session_, &better, nullptr);
+    const bool is_same = now == noticed_ && better.energy == noticed_energy_;
+    noticed_ = now;
+    noticed_energy_ = better.energy;
+    return is_same ? std::string() : std::string(text);
   }
+
+  /// Shows the shape of lower energy that notice() has announced, as a new frame. WAITS for the server's answer. False: problem() says
+  /// why.
+  bool take_better_shape() { return said(lpdeform_take_better_shape(session_, &error_)); }
 
  private:
   bool said(lpdeform_code code) {
@@ -181,6 +191,7 @@ class LpdeformFollower {
     return frame;
   }();
   lpdeform_notice noticed_ = LPDEFORM_NOTICE_NONE;
+  double noticed_energy_ = 0;  // of the better shape
   lpdeform_client* client_ = nullptr;
   lpdeform_session* session_ = nullptr;
   std::string problem_;

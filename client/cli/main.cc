@@ -156,8 +156,8 @@ void add_solver_options(CLI::App& app, DeformOptions& options) {
   app.add_option(
          "--effort", options.effort,
          "How far to look for lower minima, 0 to 1000: 12 times N further starts. 0 takes the first "
-         "minimum. Without this option: 1 with method auto where some p is below 2 and no --initial is "
-         "given, otherwise 0")
+         "minimum. Without this option: 1 with method auto where some p is below 2, unless --initial is "
+         "a mesh; otherwise 0")
       ->check(within(0, 1000))
       ->option_text("N");
   app.add_option("--time-limit", options.time_limit_seconds, "Stop after this many seconds of solving")

@@ -19,7 +19,7 @@ std::string without_minimum(client::StopReason reason) {
 }
 
 std::string starts_text(const client::SolveResult& result) {
-  return absl::StrFormat("%u further start%s, of which %u converged", result.further_starts,
+  return absl::StrFormat("%u further start%s, of which %u ended in a minimum", result.further_starts,
                          result.further_starts == 1 ? "" : "s", result.minima.size() - 1);
 }
 

@@ -349,9 +349,9 @@ struct SolveResult {
   std::uint32_t threads = 0;
   std::uint64_t input_seq = 0;
   std::vector<IterationRecord> trace = {};
-  /// The energies at which starts have converged, in order: the first minimum, then those of the search for lower ones
-  /// (MinimaSearch). Several starts may converge to the same minimum. Starts that were given up have no entry. `energy` is
-  /// the lowest. Empty if a limit has ended the solve before the first.
+  /// The energies of minima, in order: the first one, then one for each start of the search for lower ones (MinimaSearch)
+  /// that has converged, or has come back to the lowest minimum, whose energy it then has. Several starts may come to the same
+  /// minimum. Starts that were given up have no entry. `energy` is the lowest. Empty if a limit has ended the solve before the first.
   std::vector<double> minima = {};
   std::uint32_t further_starts = 0;     // of the search, including those that were given up
   std::uint32_t search_iterations = 0;  // the part of `iterations` that the search made

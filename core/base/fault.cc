@@ -1,9 +1,12 @@
 #include "core/base/fault.h"
 
+#include <charconv>
+#include <cmath>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/cord.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "core/base/reasons.h"
@@ -23,6 +26,15 @@ absl::Status make_fault(NewFault fault, std::string_view text) {
 absl::Status make_fault(absl::StatusCode code, NewFault fault, std::string_view text) {
   return carry_fault(
       code, {std::string(name_of(fault.reason)), std::move(fault.element), std::move(fault.limit)}, text);
+}
+
+std::string exact(double number) {
+  std::string text = absl::StrCat(number);
+  double read = 0;
+  if (std::isnan(number) || (absl::SimpleAtod(text, &read) && read == number)) return text;
+  char digits[32];
+  const auto end = std::to_chars(digits, digits + sizeof(digits), number);
+  return {digits, end.ptr};
 }
 
 Fault fault_of(const absl::Status& status) {

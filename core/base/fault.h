@@ -26,6 +26,9 @@ absl::Status make_fault(NewFault fault, std::string_view text);
 /// The same with another code than the usual one: proto/reasons.toml says of which reasons (`other_code`).
 absl::Status make_fault(absl::StatusCode code, NewFault fault, std::string_view text);
 
+/// A number for a fault's text, to as many digits as tell it from its neighbours: six where these read back to it.
+std::string exact(double number);
+
 /// A fault as clients receive it: it travels inside an absl::Status and reaches them unchanged. A newer server may send
 /// a reason that this version does not know.
 struct Fault {

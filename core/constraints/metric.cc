@@ -5,7 +5,10 @@
 #include <limits>
 #include <numeric>
 
+#include "absl/strings/str_format.h"
 #include "core/base/check.h"
+#include "core/base/fault.h"
+#include "core/base/reasons.h"
 
 namespace lpdeform {
 namespace {
@@ -37,6 +40,14 @@ absl::StatusOr<Metric> Metric::create(std::shared_ptr<const RestShape> shape, co
   LowerMatrix matrix = lower_pattern(*shape);
   const auto supernodes = analyse_supernodes(matrix);
   if (!supernodes.ok()) return supernodes.status();
+  const double operations = operation_count(*supernodes), most = most_operations(shape->vertex_count());
+  if (operations > most) {
+    return make_fault({Reason::kFactorTooLarge, "mesh", absl::StrFormat("multiplications <= %.2g", most)},
+                      absl::StrFormat("The factorisation of this mesh would take %.2g multiplications; at "
+                                      "most %.2g are done for %d vertices. Use a "
+                                      "mesh with fewer vertices, or one whose faces form a surface.",
+                                      operations, most, shape->vertex_count()));
+  }
   if (admit) {
     absl::Status status =
         admit(entry_count(*supernodes) * sizeof(float) + kBytesPerEntry * matrix.rows.size());

@@ -18,8 +18,8 @@ absl::Status check_field(const Field& field, std::int32_t vertex_count, const st
     if (field[i] >= lowest && field[i] <= highest) continue;
     const std::string element = field.size() == 1 ? name : absl::StrCat(name, "[", i, "]");
     const std::string limit = absl::StrCat(lowest, " <= ", name, " <= ", highest);
-    return make_fault({reason, element, limit},
-                      absl::StrCat(element, " is ", field[i], "; it must be from ", lowest, " to ", highest));
+    return make_fault({reason, element, limit}, absl::StrCat(element, " is ", exact(field[i]),
+                                                             "; it must be from ", lowest, " to ", highest));
   }
   return absl::OkStatus();
 }

@@ -218,7 +218,11 @@ SolveResult Session::result() const {
           summary.optimality_gap,
           summary.setup_seconds,
           summary.solve_seconds,
-          deformer.shape().report().split_border_vertices.count};
+          deformer.shape().report().split_border_vertices.count,
+          summary.minima,
+          summary.further_starts,
+          summary.search_iterations,
+          summary.effort};
 }
 
 Result<SolveResult> deform(const Mesh& mesh, const Handles& handles, const Settings& settings,

@@ -173,6 +173,14 @@ struct SolveResult {
   double solve_seconds = 0;
   /// Border vertices in the same place as another one. Where there are any, the mesh comes apart: see weld().
   std::int64_t split_border_vertices = 0;
+  /// The energies of minima, in order: the first one, then one for each start of the search for lower ones
+  /// (SolveOptions::effort) that has converged, or has come back to the lowest minimum, whose energy it then has. Several starts may
+  /// come to the same minimum. Starts that were given up have no entry. `energy` is the lowest. Empty if a limit has ended the solve
+  /// before the first.
+  std::vector<double> minima = {};
+  int further_starts = 0;     // of the search, including those that were given up
+  int search_iterations = 0;  // the part of `iterations` that the search made
+  int effort = 0;             // of the search: the one asked for, or the default
 };
 
 /// A mesh in which vertices that lie in the same place are one: see weld().

@@ -54,6 +54,8 @@ absl::StatusOr<SupernodePattern> analyse_supernodes(
 
 /// The number of entries that the supernodes hold, including explicit zeros.
 std::size_t entry_count(const SupernodePattern& supernodes);
+/// About how many multiplications a factorisation takes: the sum over its columns of the squared number of entries.
+double operation_count(const SupernodePattern& supernodes);
 
 /// Sparse Cholesky factorisation of symmetric positive definite matrices with the same pattern. The constructor does
 /// ordering and symbolic analysis. factor() is the numeric phase and may be repeated; after it, solve() may be called

@@ -25,6 +25,17 @@ std::size_t entry_count(const SupernodePattern& supernodes) {
   return result;
 }
 
+double operation_count(const SupernodePattern& supernodes) {
+  double result = 0;
+  for (std::size_t k = 0; k + 1 < supernodes.first_columns.size(); ++k) {
+    const double columns = supernodes.first_columns[k + 1] - supernodes.first_columns[k];
+    const auto below = static_cast<double>(supernodes.first_rows[k + 1] - supernodes.first_rows[k]);
+    // sum_{j = 1}^columns (below + j)^2
+    result += columns * (below * below + below * (columns + 1) + (columns + 1) * (2 * columns + 1) / 6);
+  }
+  return result;
+}
+
 SingleCholesky::SingleCholesky(const SupernodePattern& supernodes) {
   const std::size_t n = supernodes.new_to_old.size();
   old_to_new_.resize(n);

@@ -11,7 +11,8 @@ namespace lpdeform {
 namespace {
 
 absl::Status out_of_range(Reason reason, const std::string& name, double value, const std::string& limit) {
-  return make_fault({reason, name, limit}, absl::StrCat(name, " is ", value, "; it must satisfy ", limit));
+  return make_fault({reason, name, limit},
+                    absl::StrCat(name, " is ", exact(value), "; it must satisfy ", limit));
 }
 
 absl::Status check_limits(const SolveSettings& settings) {

@@ -15,7 +15,7 @@ absl::Status check_weight(std::string_view name, double weight) {
   if (weight >= 0 && weight <= kHighestSoftWeight) return absl::OkStatus();
   return make_fault({Reason::kHandleWeightOutOfRange, handle_element(name),
                      absl::StrCat("0 <= weight <= ", kHighestSoftWeight)},
-                    absl::StrCat("the weight of ", handle_element(name), " is ", weight,
+                    absl::StrCat("the weight of ", handle_element(name), " is ", exact(weight),
                                  "; it must be from 0 to ", kHighestSoftWeight));
 }
 

@@ -22,7 +22,8 @@ constexpr std::size_t kStates = 12 * sizeof(double);
 constexpr std::size_t kCellBytes = 60, kEdgeBytes = 30;  // of CellPass: per vertex, per directed edge
 // The coarse levels take about 1 / kCoarseShare more; of a fine shape of CoarseLevel::kLarge vertices or more, 1 / kCoarseShareOfLarge.
 constexpr std::size_t kCoarseShare = 4, kCoarseShareOfLarge = 6;
-constexpr std::int32_t kCoarsenBeforehand = 10000;  // vertices from which on cold solves have a coarse level
+/// Vertices from which on the coarse mesh is made beside the ordering: cold solves have a coarse level then, whatever p is.
+constexpr std::int32_t kCoarsenBeforehand = 10000;
 
 /// Memory of a Deformer without its metric.
 std::size_t bytes_beside_metric(const RestShape& shape) {
@@ -60,7 +61,7 @@ absl::StatusOr<std::unique_ptr<Deformer>> Deformer::create(std::shared_ptr<const
   const Metric::Admission admit = [&](std::size_t metric_bytes) {
     if (!options.admit) return absl::OkStatus();
     const std::size_t own = metric_bytes + bytes_beside_metric(*shape);
-    const bool has_coarse = shape->vertex_count() >= kCoarsenBeforehand;
+    const bool has_coarse = shape->vertex_count() >= Impl::kLargeMesh;
     const bool is_large = shape->vertex_count() >= CoarseLevel::kLarge;
     std::size_t with_levels = has_coarse ? own + own / (is_large ? kCoarseShareOfLarge : kCoarseShare) : own;
     if (shape->vertex_count() >= std::min(options.graded_from, options.late_graded_from))
@@ -147,6 +148,25 @@ absl::Status Deformer::set_positions(const Points& positions) {
   impl_->is_positions_current = true;
   impl_->state = Impl::State::kDeformed;
   return absl::OkStatus();
+}
+
+void Deformer::measure() {
+  Impl& self = *impl_;
+  self.interrupt();
+  if (self.constraints) {
+    SoftTerms soft = self.constraints->soft;
+    soft.set_length_unit(self.length_unit() / self.unit());
+    self.objective.set_soft_terms(std::move(soft));
+  }
+  self.is_guess_evaluated = false;
+  const double typical = self.typical_energy(self.x);
+  const Material material = self.constraints ? self.effective_material() : self.material;
+  const LpNorm norm(material, self.shape->vertex_count(), self.unit(), typical);
+  self.summary.energy = norm.true_energy(self.objective.sum(norm));
+  self.summary.soft_energy = norm.true_energy(self.objective.soft_terms().sum(norm));
+  const auto& e2 = self.objective.cells().squared_energies();
+  for (std::size_t i = 0; i < e2.size(); ++i)
+    self.best_energies[static_cast<Eigen::Index>(i)] = self.unit() * std::sqrt(e2[i]);
 }
 
 void Deformer::displace(const Points& by) {

@@ -28,7 +28,7 @@ struct DeformerOptions {
   std::int32_t search_up_to = 15000;  // vertices
   /// The search of a solve keeps the first minimum unless another one saves at least this share of the energy.
   double least_saving = 0;
-  /// Cold solves of meshes of this size have a graded level between the coarse and the fine one (GradedLevel).
+  /// Cold solves of meshes of this size may have a graded level between the coarse and the fine one (GradedLevel).
   std::int32_t graded_from = 200000;  // vertices
   /// Cold solves of meshes of this size may have one later, where the fine level has a long way to go and no p_i is above 2.
   std::int32_t late_graded_from = 60000;  // vertices
@@ -72,6 +72,10 @@ class Deformer {
   /// Makes `positions` the current state, from which InitialGuess::kCurrent starts. Errors: as check_positions.
   /// Ends a running solve with kCancelled.
   absl::Status set_positions(const Points& positions);
+  /// Makes cell_energies() and the energies of summary() those of positions(), for the present handles and material; of soft terms
+  /// only where handles are set. Until a solve begins they are 0 otherwise, or those of the solve before. Ends a running solve with
+  /// kCancelled.
+  void measure();
 
   /// Only for coarse levels: moves the current state by `by`, in the caller's units, and the levels below it in the same way. Not
   /// during a solve.
@@ -82,8 +86,8 @@ class Deformer {
   double lowest_energy() const;
 
   /// Begins a solve. Errors: FAILED_PRECONDITION (NO_HANDLES); INVALID_ARGUMENT (METHOD_NEEDS_P,
-  /// METHOD_NEEDS_EXACT_HANDLES, TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE). `stop` is
-  /// checked in every iteration.
+  /// METHOD_NEEDS_EXACT_HANDLES, TOLERANCE_OUT_OF_RANGE, ITERATIONS_OUT_OF_RANGE, TIME_LIMIT_OUT_OF_RANGE,
+  /// EFFORT_OUT_OF_RANGE, LEAST_SHARE_OUT_OF_RANGE). `stop` is checked in every iteration.
   absl::Status start(const SolveSettings& settings, std::stop_token stop = {});
   /// Only for coarse levels: the same from positions(), as from the result of a coarse level (Warmth::kPrepared), with held vertices at
   /// their targets. settings.initial does not matter.
@@ -133,8 +137,8 @@ class Deformer {
 
   /// Updates positions(), cell_energies() and summary() to the prolonged state of the coarse level of a running
   /// kMultiresolution, if that is better than the guess; otherwise does nothing. Later steps and the result do not
-  /// change. Takes about as long as two iterations. Does nothing if the coarse level has made little progress since the
-  /// last call. With `is_last`, for a solve that will not go on, the state then depends on its steps alone, not on earlier
+  /// change. Takes about as long as three iterations, or five while a graded level runs, and does nothing until four times that time has
+  /// passed since it last did. With `is_last`, for a solve that will not go on, the state then depends on its steps alone, not on earlier
   /// calls or the time.
   void catch_up(bool is_last = false);
 

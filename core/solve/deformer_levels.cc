@@ -20,7 +20,8 @@ constexpr std::int32_t kLargestSearchedLevel =
 // Minima of a coarse level that differ by less than this may be in another order on the fine level. It counts where the fine
 // level is too large to be searched itself.
 constexpr double kLeastSavingOfLevel = 0.02;
-// Of a level: fewer than DeformerOptions has, because nothing else of a session runs beside one of its levels.
+// Of a level: fewer than DeformerOptions has, because nothing else of a session runs beside one of its levels but the
+// lowest.
 constexpr std::int32_t kVerticesAThread = 800;
 constexpr std::int32_t kNever = std::numeric_limits<std::int32_t>::max();  // vertices
 // See can_compare_guesses. At p = 1, where kinks move, going alone is not nearer to the minimum in the same time.

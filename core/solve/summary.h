@@ -31,12 +31,12 @@ struct SolveSummary {
   /// bounds how far the result can be from the optimum for these rotations. 0 if E is 0 to rounding. Empty if not
   /// requested.
   std::optional<double> optimality_gap;
-  /// True energies at which starts have converged, in order: the first minimum, then those of the search for lower ones
-  /// (SolveSettings::effort). Several starts may converge to the same minimum. `energy` is the lowest. Empty if a limit has
-  /// ended the solve before the first.
+  /// True energies of minima, in order: the first one, then one for each start of the search for lower ones
+  /// (SolveSettings::effort) that has converged, or has come back to the lowest minimum, whose energy it then has. Several starts may come
+  /// to the same minimum. `energy` is the lowest. Empty if a limit has ended the solve before the first.
   std::vector<double> minima;
-  /// The further starts of the search. Those that were given up, because they came nowhere near the lowest minimum, have no
-  /// entry in `minima`.
+  /// The further starts of the search. Those that were given up, because they were more than 2 % above the lowest minimum after a rough
+  /// solve or did not come nearer to it, have no entry in `minima`.
   int further_starts = 0;
   int search_iterations = 0;  // the part of `iterations` that the search made
   int effort = 0;             // SolveSettings::effort, or its default

@@ -28,7 +28,8 @@ namespace lpdeform {
 ///
 /// Solves for readers take the first minimum. If a result has stood for kSearchQuiet, the solver looks for lower
 /// minima (Deformer::start_search) while nobody waits for an answer, and announces or shows the lowest one, if it saves enough. It
-/// goes on with further starts, with ever longer pauses, until it has made kMostStarts for these inputs.
+/// goes on with further starts, with ever longer pauses, until it has made kMostStarts for these inputs, or as many as the effort asks for if
+/// these are more.
 /// Once a writer has taken the announced shape (Publisher::take_better), all that follows goes on from it.
 class LiveSolver {
  public:

@@ -62,6 +62,13 @@ absl::Status ended_by(EndReason reason, const std::string& text) {
   return make_fault({why, "", ""}, text);
 }
 
+/// Finds the energies of the surface that a session begins with. Where its handles are refused, they are without those of soft handles.
+void measure(Deformer& deformer, const Inputs& inputs) {
+  absl::Status status = deformer.set_material(*inputs.material);
+  if (status.ok() && !inputs.handles->handles().empty()) status = deformer.set_handles(*inputs.handles);
+  deformer.measure();
+}
+
 }  // namespace
 
 absl::StatusOr<std::shared_ptr<Session>> Session::create(SessionParts parts, SessionServices services) {
@@ -72,6 +79,7 @@ absl::StatusOr<std::shared_ptr<Session>> Session::create(SessionParts parts, Ses
   const absl::Status begun = past ? session->mailbox_.begin_again(beginning, past->ages, past->history)
                                   : session->mailbox_.begin_with(beginning);
   if (!begun.ok()) return begun;
+  if (session->has_surface_) measure(*deformer, session->mailbox_.newest());
   LiveSolver::Alarm alarm{session->services_.timers, [weak = session->weak_from_this()] {
                             if (const auto self = weak.lock()) self->services_.scheduler.wake(self);
                           }};

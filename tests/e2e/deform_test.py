@@ -110,7 +110,7 @@ class Deform(OnShapes):
         first = report["iterations"] - report["search_iterations"]
         converged = len(report["minima"]) - 1
         self.assertTrue(self.second_line("--p", 1.5).startswith(
-            f"looked for lower minima from 12 further starts, of which {converged} converged; "
+            f"looked for lower minima from 12 further starts, of which {converged} ended in a minimum; "
             f"minima of {report['different_energies']} energ"))
         self.assertEqual(self.second_line("--p", 1.5, "--effort", 0, "--certify"), "no other minima were looked for (effort 0)")
         self.assertIsNone(self.second_line("--p", 1.5, "--effort", 0))

@@ -132,7 +132,7 @@ class Stop(bpy.types.Operator):
 
 
 class Solve(bpy.types.Operator):
-    """Wait for the finished result, with a bound on its distance from the optimum"""
+    """Wait for the finished result, with a bound on its distance from the optimum for its rotations"""
 
     bl_idname = "lpdeform.solve"
     bl_label = "Solve"

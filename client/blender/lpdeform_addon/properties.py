@@ -48,7 +48,7 @@ class MeshSettings(bpy.types.PropertyGroup):
         "be the same for all of them",
     )  # fmt: skip
     certify: BoolProperty(
-        name="Bound", default=False, description="Reports a bound on a result's distance from the optimum. Takes effect at the next start"
+        name="Bound", default=False, description="Reports a bound on a result's distance from the optimum for its rotations. Takes effect at the next start"
     )
     show_distortion: BoolProperty(
         name="As colour", default=True, description="Fills the colour attribute lpdeform distortion"

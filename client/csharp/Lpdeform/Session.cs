@@ -57,8 +57,7 @@ namespace Lpdeform
             {
                 var text = new byte[512];
                 var reason = (NoticeReason)Native.lpdeform_session_notice(Pointer, text, (UIntPtr)(uint)text.Length);
-                var better = new Native.BetterShape { StructSize = (uint)sizeof(Native.BetterShape) };
-                if (reason == NoticeReason.BetterShape) Native.lpdeform_session_better_shape(Pointer, ref better, null);
+                var better = BetterShapeOf(reason);
                 return new Notice
                 {
                     Reason = reason, Text = System.Text.Encoding.UTF8.GetString(text, 0, Array.IndexOf(text, (byte)0)),
@@ -67,18 +66,33 @@ namespace Lpdeform
             }
         }
 
-        /// Notice has changed. Raised by TryGetFrame, before it looks for a frame, on the thread that calls it.
+        Native.BetterShape BetterShapeOf(NoticeReason reason)
+        {
+            var better = new Native.BetterShape { StructSize = (uint)sizeof(Native.BetterShape) };
+            if (reason == NoticeReason.BetterShape) Native.lpdeform_session_better_shape(Pointer, ref better, null);
+            return better;
+        }
+
+        /// Notice has changed, also where a still better shape is known. Raised by TryGetFrame, before it looks for a frame, on the thread that calls it.
         public event Action<Notice> Noticed;
 
-        NoticeReason noticed;
+        Notice noticed;
+
+        bool IsNoticed(NoticeReason reason, ulong inputSeq, double energy)
+        {
+            return noticed.Reason == reason && noticed.InputSeq == inputSeq && noticed.Energy == energy;
+        }
 
         void TellNotice()
         {
             var told = Noticed;
-            if (told == null || (NoticeReason)Native.lpdeform_session_notice(Pointer, null, UIntPtr.Zero) == noticed) return;
+            if (told == null) return;
+            var reason = (NoticeReason)Native.lpdeform_session_notice(Pointer, null, UIntPtr.Zero);
+            var better = BetterShapeOf(reason);
+            if (IsNoticed(reason, better.InputSeq, better.Energy)) return;
             var notice = Notice;
-            if (notice.Reason == noticed) return;
-            noticed = notice.Reason;
+            if (IsNoticed(notice.Reason, notice.InputSeq, notice.Energy)) return;
+            noticed = notice;
             told(notice);
         }
 

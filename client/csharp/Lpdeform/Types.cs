@@ -105,9 +105,10 @@ namespace Lpdeform
     /// minimum may be lower.
     public struct SearchReport
     {
-        /// The energies at which starts have converged, in order: the first minimum, then those of the search for lower ones.
-        /// Several starts may converge to the same minimum. Frame.Energy is the lowest. Empty if a limit has ended the solve before
-        /// the first, and with a server that is older than the search.
+        /// The energies of minima, in order: the first one, then one for each start of the search for lower ones that has
+        /// converged, or has come back to the lowest minimum, whose energy it then has. Several starts may come to the same minimum.
+        /// Frame.Energy is the lowest. Empty if a limit has ended the solve before the first, and with a server that is older than
+        /// the search.
         public double[] Minima;
         /// Of the search, including those that were given up, which have no energy.
         public int FurtherStarts;

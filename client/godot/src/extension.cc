@@ -16,6 +16,7 @@ const std::vector<godot::Method>& session_methods() {
       method<&Session::let_go>("let_go", {"name"}),
       method<&Session::move>("move", {"name", "rotation", "translation"}),
       method<&Session::set_p>("set_p", {"p", "shows_better"}),
+      method<&Session::take_better_shape>("take_better_shape"),
       method<&Session::tick>("tick"),
       method<&Session::positions>("positions"),
       method<&Session::normals>("normals"),

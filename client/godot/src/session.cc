@@ -38,6 +38,10 @@ bool Session::set_p(double p, bool shows_better) {
   return follower_ && follower_->set(p, shows_better);
 }
 
+bool Session::take_better_shape() {
+  return follower_ && follower_->take_better_shape();
+}
+
 bool Session::tick() {
   return follower_ && follower_->tick();
 }

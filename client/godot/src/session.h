@@ -8,7 +8,7 @@
 #include "godot.h"
 
 /// The class LpdeformSession of Godot's scripts: an LpdeformFollower that open() makes. Nothing here waits for the network, except
-/// when the object ends (see LpdeformFollower). Functions that return a text return "" where nothing is wrong. Before open(), and where it failed, the others return false, or nothing.
+/// take_better_shape() and the end of the object (see LpdeformFollower). Functions that return a text return "" where nothing is wrong. Before open(), and where it failed, the others return false, or nothing.
 class Session {
  public:
   /// Begins a session of the mesh. `positions` in Godot's coordinates; `normals` as many, or none; three `indices` per triangle,
@@ -24,6 +24,8 @@ class Session {
   bool move(const std::string& name, const godot::Quaternion& rotation, const godot::Vector3& translation);
   /// See LpdeformFollower::set.
   bool set_p(double p, bool shows_better);
+  /// See LpdeformFollower::take_better_shape.
+  bool take_better_shape();
   /// Once per picture. True if positions(), normals() and colours() are new.
   bool tick();
 

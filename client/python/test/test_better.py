@@ -141,7 +141,7 @@ def test_a_solve_says_which_minima_it_has_seen(place: Place) -> None:
         result = session.solve()
         assert result.further_starts == 12
         assert result.energy == min(result.minima)
-        starts = f"looked for lower minima from 12 further starts, of which {len(result.minima) - 1} converged; minima of "
+        starts = f"looked for lower minima from 12 further starts, of which {len(result.minima) - 1} ended in a minimum; minima of "
         assert result.searched.startswith(starts)
     with bend(place, effort=0) as session:
         result = session.solve(certify=True)
@@ -159,10 +159,10 @@ def test_what_was_searched_is_said_without_a_word_too_much(place: Place) -> None
 
     # A single start may be the result of coarse levels, or the only one before a limit.
     assert said(minima=(8.0,), further_starts=1) == (
-        "looked for lower minima from 1 further start, of which 0 converged; minima of 1 energy were seen, E = 8"
+        "looked for lower minima from 1 further start, of which 0 ended in a minimum; minima of 1 energy were seen, E = 8"
     )
     assert said(minima=(8.0, 8.004, 7.0, 7.001, 7.5), further_starts=8) == (
-        "looked for lower minima from 8 further starts, of which 4 converged; minima of 3 energies were seen, E from 7 to 8.004"
+        "looked for lower minima from 8 further starts, of which 4 ended in a minimum; minima of 3 energies were seen, E from 7 to 8.004"
     )
     assert said(search_iterations=3) == "the search for lower minima ended before its first start did"
     assert said(minima=()) == "the server does not say whether it looked for other minima"

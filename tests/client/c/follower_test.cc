@@ -107,12 +107,17 @@ TEST_F(FollowerOfABentBar, ShowsABetterShapeWhereThatIsAskedFor) {
   EXPECT_EQ(follower_->notice(), "");
 }
 
-TEST_F(FollowerOfABentBar, SaysOnceThatABetterShapeIsKnown) {
+TEST_F(FollowerOfABentBar, SaysOnceThatABetterShapeIsKnownAndTakesIt) {
+  EXPECT_FALSE(follower_->take_better_shape());
+  EXPECT_FALSE(follower_->problem().empty());
   EXPECT_TRUE(follower_->set(1.5, false));
   std::string said;
   const auto says_it = [&] { return (said = follower_->notice()).find("energy") != std::string::npos; };
   ASSERT_TRUE(tick_until(says_it)) << said << follower_->problem();
   EXPECT_EQ(follower_->notice(), "");
+  const double first = follower_->frame().energy;
+  ASSERT_TRUE(follower_->take_better_shape()) << follower_->problem();
+  EXPECT_TRUE(tick_until([&] { return follower_->frame().energy < 0.98 * first; }));
 }
 
 }  // namespace

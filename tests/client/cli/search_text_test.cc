@@ -24,25 +24,27 @@ client::SolveResult searched(std::uint32_t effort, std::uint32_t starts, std::ve
 
 TEST(SearchText, CountsTheStartsThatConvergedAndTheEnergiesThatDiffer) {
   EXPECT_EQ(search_text(searched(1, 8, {8.004, 7, 7.001, 7.5})),
-            "looked for lower minima from 8 further starts, of which 4 converged; minima of 3 energies were "
+            "looked for lower minima from 8 further starts, of which 4 ended in a minimum; minima of 3 "
+            "energies were "
             "seen, E "
             "from 7 to 8.004");
-  EXPECT_EQ(search_text(searched(1, 8)),
-            "looked for lower minima from 8 further starts, of which 0 converged; minima of 1 energy were "
-            "seen, E = 8");
+  EXPECT_EQ(
+      search_text(searched(1, 8)),
+      "looked for lower minima from 8 further starts, of which 0 ended in a minimum; minima of 1 energy were "
+      "seen, E = 8");
 }
 
 TEST(SearchText, DoesNotSayWhereASingleStartLooked) {
   // It is the result of coarse levels, or the only one of a small mesh before a limit.
-  EXPECT_EQ(
-      search_text(searched(1, 1, {7})),
-      "looked for lower minima from 1 further start, of which 1 converged; minima of 2 energies were seen, "
-      "E from 7 to "
-      "8");
-  EXPECT_EQ(
-      search_text(searched(1, 1)),
-      "looked for lower minima from 1 further start, of which 0 converged; minima of 1 energy were seen, "
-      "E = 8");
+  EXPECT_EQ(search_text(searched(1, 1, {7})),
+            "looked for lower minima from 1 further start, of which 1 ended in a minimum; minima of 2 "
+            "energies were seen, "
+            "E from 7 to "
+            "8");
+  EXPECT_EQ(search_text(searched(1, 1)),
+            "looked for lower minima from 1 further start, of which 0 ended in a minimum; minima of 1 energy "
+            "were seen, "
+            "E = 8");
 }
 
 TEST(SearchText, GivesNoReasonWhyThereWasNoSearch) {

@@ -6,7 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/fault.h"
 #include "tests/core/poses.h"
+#include "tests/support/glued_shape.h"
 
 namespace lpdeform {
 namespace {
@@ -239,6 +241,20 @@ TEST_F(MetricTest, FailsWithoutUsableWeights) {
   EXPECT_FALSE(metric.factor(std::vector<double>(shape->vertex_count(), 0.0), is_held, {}, Workers(1)));
   EXPECT_FALSE(
       metric.factor(std::vector<double>(shape->vertex_count(), std::nan("")), is_held, {}, Workers(1)));
+}
+
+TEST(MetricOfFaceSoup, IsRefusedWhereAFactorisationTakesTooLong) {
+  const auto shape = RestShape::create(glued_at_random(6000));
+  ASSERT_TRUE(shape.ok());
+  std::size_t asked = 0;
+  const auto refused = Metric::create(*shape, [&](std::size_t bytes) {
+    asked = bytes;
+    return absl::OkStatus();
+  });
+  const Fault fault = fault_of(refused.status());
+  EXPECT_EQ(fault.reason, "FACTOR_TOO_LARGE");
+  EXPECT_EQ(fault.limit, "multiplications <= 2e+11");
+  EXPECT_EQ(asked, 0u);  // no memory is asked for
 }
 
 TEST_F(MetricTest, StaysPositiveDefiniteWhereCellsHaveNoWeight) {

@@ -153,6 +153,24 @@ TEST(CoreLibrary, CertifiesAResult) {
   EXPECT_LT(*result->optimality_gap, 1e-3);
 }
 
+TEST(CoreLibrary, SaysWhatItHasSearched) {
+  const auto first = deform(sheet(), folded(), {.p = 1.5}, {.effort = 0});
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->minima, std::vector{first->energy});
+  EXPECT_EQ(first->further_starts, 0);
+  EXPECT_EQ(first->search_iterations, 0);
+  EXPECT_EQ(first->effort, 0);
+  const auto result = deform(sheet(), folded(), {.p = 1.5});
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->effort, 1);
+  EXPECT_EQ(result->further_starts, 12);
+  EXPECT_GT(result->search_iterations, 0);
+  EXPECT_LE(result->search_iterations, result->iterations - first->iterations);
+  ASSERT_FALSE(result->minima.empty());
+  EXPECT_EQ(result->minima.front(), first->energy);
+  EXPECT_EQ(*std::ranges::min_element(result->minima), result->energy);
+}
+
 TEST(CoreLibrary, HoldsWhatIsOutsideTheRegion) {
   auto session = Session::open(sheet());
   std::vector<std::uint32_t> region;

@@ -169,6 +169,19 @@ TEST(SingleCholesky, RaisesAFewPivotsIfThatIsWanted) {
   }
 }
 
+TEST(SupernodePattern, KnowsHowManyMultiplicationsAFactorisationTakes) {
+  const SupernodePattern pattern = analyse_supernodes(square_laplacian(30)).value();
+  double sum = 0;
+  for (std::size_t k = 0; k + 1 < pattern.first_columns.size(); ++k) {
+    const auto below = static_cast<double>(pattern.first_rows[k + 1] - pattern.first_rows[k]);
+    for (std::int32_t j = pattern.first_columns[k]; j < pattern.first_columns[k + 1]; ++j) {
+      const double entries = below + pattern.first_columns[k + 1] - j;
+      sum += entries * entries;
+    }
+  }
+  EXPECT_NEAR(operation_count(pattern), sum, 1e-9 * sum);
+}
+
 TEST(SupernodePattern, IsRefusedWhereTheFactorIsTooLarge) {
   const LowerMatrix matrix = square_laplacian(30);
   const std::size_t entries = entry_count(analyse_supernodes(matrix).value());

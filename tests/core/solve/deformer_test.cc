@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <string>
 
 #include "core/base/fault.h"
 #include "tests/core/poses.h"
@@ -50,6 +51,18 @@ TEST_F(DeformerTest, RefusesBadSettingsAndNamesThem) {
   EXPECT_EQ(fault_of(Deformer::create(shape, {.threads = 0}).status()).reason, "THREADS_OUT_OF_RANGE");
   EXPECT_EQ(fault_of(Deformer::create(nullptr, {}).status()).reason, "NO_SHAPE");
   EXPECT_EQ(fault_of(Deformer::create(shape, {}).value()->start({})).reason, "NO_HANDLES");
+}
+
+TEST_F(DeformerTest, RefusalsGiveValuesThatAreJustOutsideExactly) {
+  auto solver = deformer(shape, ends(30), Material::uniform(1.5));
+  const auto text = [](const absl::Status& status) { return std::string(status.message()); };
+  EXPECT_EQ(text(solver->set_material(Material::uniform(64.0000001))),
+            "p is 64.0000001; it must be from 1 to 64");
+  EXPECT_EQ(text(solver->set_material(Material::uniform(65))), "p is 65; it must be from 1 to 64");
+  EXPECT_EQ(text(solver->start({.tolerance = 0.1000001})),
+            "tolerance is 0.1000001; it must satisfy 1e-14 <= tolerance <= 0.1");
+  EXPECT_EQ(text(solver->start({.tolerance = kNan})),
+            "tolerance is nan; it must satisfy 1e-14 <= tolerance <= 0.1");
 }
 
 TEST_F(DeformerTest, KeepsItsStateWhereAnInputIsRefused) {
@@ -137,6 +150,29 @@ TEST_F(DeformerTest, StartsFromTheRestMeshOrAGivenOne) {
   ASSERT_TRUE(solver->set_positions(given).ok());
   EXPECT_EQ(solver->positions(), given);
   EXPECT_TRUE(solver->solve({}).ok());
+}
+
+TEST_F(DeformerTest, MeasuresPositionsThatWereSet) {
+  HandleSet soft = ends(40);
+  Handle pulled = {slice(bar, 2, 4, 4), RigidMotion{.translation = {1, 2, 0}}, Soft{3}};
+  ASSERT_TRUE(soft.set("soft", pulled).ok());
+  for (const HandleSet& handles : {ends(40), soft}) {
+    auto solver = deformer(shape, handles, Material::uniform(1.5));
+    const SolveSummary solved = solver->solve({}).value();
+    auto other = deformer(shape, handles, Material::uniform(1.5));
+    ASSERT_TRUE(other->set_positions(solver->positions()).ok());
+    EXPECT_EQ(other->summary().energy, 0);
+    other->measure();
+    EXPECT_NEAR(other->summary().energy, solved.energy, 1e-9 * solved.energy);
+    EXPECT_NEAR(other->summary().soft_energy, solved.soft_energy, 1e-9 * solved.energy);
+    EXPECT_LT((other->cell_energies() - solver->cell_energies()).cwiseAbs().maxCoeff(), 1e-9);
+    EXPECT_EQ(other->positions(), solver->positions());
+    EXPECT_TRUE(other->solve({}).ok());
+  }
+  auto free = Deformer::create(shape, {}).value();  // without handles
+  ASSERT_TRUE(free->set_positions(2 * bar.vertices).ok());
+  free->measure();
+  EXPECT_GT(free->summary().energy, 0);
 }
 
 TEST_F(DeformerTest, SaysStalledWhereNoStepHelpsShortOfTheTolerance) {

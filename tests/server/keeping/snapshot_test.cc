@@ -4,8 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <functional>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "absl/strings/match.h"
 #include "core/base/fault.h"
@@ -152,6 +155,45 @@ TEST_F(SnapshotTest, ItBeginsWithTheSurfaceThatWasThere) {
   EXPECT_TRUE(opened(snapshot(copy)).surface().data().inline_() == was);
   DeformClient stream(*stub_, copy, options);
   EXPECT_TRUE(stream.settle(1).has_value());
+}
+
+TEST_F(SnapshotTest, ASurfaceThatNothingHoldsAnyMoreHasItsEnergies) {
+  const TriangleMesh mesh = bar_mesh();
+  const auto session = create(mesh);
+  v1::FrameOptions options;
+  options.set_scalar(v1::SCALAR_FLOAT64);
+  v1::Update update = ends_message(mesh.vertices, 1, 2);
+  update.mutable_settings()->mutable_p()->set_uniform(1.5);
+  ReceivedFrame was;
+  {
+    DeformClient stream(*stub_, session, options);
+    ASSERT_TRUE(stream.send(update));
+    const auto frame = stream.settle(1);
+    ASSERT_TRUE(frame.has_value());
+    was = *frame;
+    update.clear_settings();
+    for (auto& handle : *update.mutable_handles()) {
+      const std::string name = handle.name();
+      handle.Clear();
+      handle.set_name(name);
+      handle.mutable_remove();
+    }
+    update.set_input_seq(2);
+    ASSERT_TRUE(stream.send(update));
+    ASSERT_TRUE(stream.settle(2).has_value());
+  }
+  const auto copy = restored(snapshot(session));
+  DeformClient stream(*stub_, copy, options);
+  const auto frame = stream.next_frame();
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_GT(was.header.energy(), 1);
+  EXPECT_NEAR(frame->header.energy(), was.header.energy(), 1e-9 * was.header.energy());
+  EXPECT_TRUE(frame->positions == was.positions);
+  ASSERT_EQ(frame->distortion.size(), was.distortion.size());
+  std::vector<double> now(was.distortion.size() / sizeof(double)), then(now.size());
+  std::memcpy(now.data(), frame->distortion.data(), was.distortion.size());
+  std::memcpy(then.data(), was.distortion.data(), was.distortion.size());
+  for (std::size_t v = 0; v < now.size(); ++v) EXPECT_NEAR(now[v], then[v], 1e-9) << v;
 }
 
 TEST_F(SnapshotTest, AWeldedSessionWithNormalsIsTheSame) {

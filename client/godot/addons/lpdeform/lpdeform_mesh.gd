@@ -4,7 +4,8 @@ class_name LpdeformMesh
 extends MeshInstance3D
 ## A mesh that follows its handles, which are [LpdeformHandle]s below it. An lpdeform server computes its shape.
 ##
-## It is live in the game, and in the editor if [member live_in_editor] is on. Nothing here waits for the network. While the server
+## It is live in the game, and in the editor if [member live_in_editor] is on. Nothing here waits for the network, except
+## [method take_better_shape]. While the server
 ## cannot be reached, the last shape stays.
 
 ## Of this add-on.
@@ -45,7 +46,8 @@ signal failed(text: String)
 		p = value
 		_set_p()
 
-## Show a shape of lower energy at once when the server has found one. Otherwise the output says that there is one.
+## Show a shape of lower energy at once when the server has found one. Otherwise the output says that there is one, and
+## [method take_better_shape] shows it.
 @export var show_better_shapes := false:
 	set(value):
 		show_better_shapes = value
@@ -134,6 +136,12 @@ func begin() -> void:
 	_last_problem = ""
 	_set_p()
 	update_configuration_warnings()
+
+
+## Shows the shape of lower energy that the output has announced. Waits for the server's answer. False if there was none, or if the server
+## does not answer; [signal failed] then says why.
+func take_better_shape() -> bool:
+	return _session != null and _session.take_better_shape()
 
 
 func _begin_soon() -> void:

@@ -358,9 +358,10 @@ class SolveResult:
     threads: int
     input_seq: int
     minima: tuple[float, ...]
-    """The energies at which starts have converged, in order: the first minimum, then those of the search for lower ones (see
-    MinimaSearch). Several starts may converge to the same minimum. Starts that were given up have no entry. `energy` is the
-    lowest. Empty if a limit has ended the solve before the first."""
+    """The energies of minima, in order: the first one, then one for each start of the search for lower ones (see MinimaSearch)
+    that has converged, or has come back to the lowest minimum, whose energy it then has. Several starts may come to the same
+    minimum. Starts that were given up have no entry. `energy` is the lowest. Empty if a limit has ended the solve before the
+    first."""
     further_starts: int
     """How many further starts the search made, including those that were given up."""
     search_iterations: int
@@ -402,7 +403,7 @@ class SolveResult:
         energies = f"1 energy were seen, E = {minima[0]:.6g}"
         if count > 1:
             energies = f"{count} energies were seen, E from {minima[0]:.6g} to {minima[-1]:.6g}"
-        return f"looked for lower minima from {starts}, of which {len(minima) - 1} converged; minima of {energies}"
+        return f"looked for lower minima from {starts}, of which {len(minima) - 1} ended in a minimum; minima of {energies}"
 
     def __repr__(self) -> str:
         gap = "" if self.optimality_gap is None else f", gap {self.optimality_gap:.2g} for its rotations"

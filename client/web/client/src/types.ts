@@ -235,7 +235,7 @@ export interface DoubleSurface {
 }
 
 /**
- * A state of the surface on its way to the optimum. The caller may keep the arrays, which are views of the received message.
+ * A state of the surface on its way to the result. The caller may keep the arrays, which are views of the received message.
  * For a frame of doubles or a quantized frame, positions, distortion and normals are computed when they are first read.
  */
 export interface Frame {
@@ -338,9 +338,10 @@ export interface SolveResult<Numbers = Float32Array> {
   threads: number;
   inputSeq: number;
   /**
-   * The energies at which starts have converged, in order: the first minimum, then those of the search for lower ones (see
-   * MinimaSearch). Several starts may converge to the same minimum. Starts that were given up have no entry. `energy` is the
-   * lowest. Empty if a limit has ended the solve before the first.
+   * The energies of minima, in order: the first one, then one for each start of the search for lower ones (see MinimaSearch)
+   * that has converged, or has come back to the lowest minimum, whose energy it then has. Several starts may come to the same
+   * minimum. Starts that were given up have no entry. `energy` is the lowest. Empty if a limit has ended the solve before the
+   * first.
    */
   minima: readonly number[];
   /** How many further starts the search made, including those that were given up. */

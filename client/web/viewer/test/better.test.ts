@@ -111,8 +111,8 @@ it("one better shape is offered by what it saves, several by the most that one o
   expect(betterText([0.03, 0.0714])).toBe("Take shapes with up to 7\u00a0% less energy");
 });
 
-it("what a better shape saves is not rounded up to a whole percent", () => {
-  expect([0.003, 0.0096, 0.0149, 0.07, 0.999].map(percent)).toEqual([0.3, 1, 1, 7, 99].map((value) => `${value}\u00a0%`));
+it("what a better shape saves is rounded down", () => {
+  expect([0.003, 0.0096, 0.0149, 0.066, 0.07, 0.999].map(percent)).toEqual([0.3, 0.9, 1, 6, 7, 99].map((value) => `${value}\u00a0%`));
 });
 
 it("beside the gap stands what is known of lower minima, and otherwise that there may be one", () => {

@@ -22,6 +22,7 @@ using TCHAR = char;
 #define UCLASS(...)
 #define USTRUCT(...)
 #define UPROPERTY(...)
+#define UFUNCTION(...)
 #define UE_LOG(category, verbosity, ...) unreal_log(__VA_ARGS__)
 
 inline std::vector<std::string> unreal_logs;

@@ -103,6 +103,10 @@ void ULpdeformComponent::Move(FLpdeformHandle& Handle) {
   if (bTaken) Handle.Sent = Here;
 }
 
+void ULpdeformComponent::TakeBetterShape() {
+  if (Follower) Follower->take_better_shape();  // the next tick says what was wrong
+}
+
 /** Once a picture. Nothing here waits for the network. */
 void ULpdeformComponent::TickComponent(float Seconds, ELevelTick Tick, FActorComponentTickFunction* Function) {
   Super::TickComponent(Seconds, Tick, Function);

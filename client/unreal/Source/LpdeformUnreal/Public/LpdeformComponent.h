@@ -39,12 +39,16 @@ class LPDEFORMUNREAL_API ULpdeformComponent : public UDynamicMeshComponent {
   /** Counts from the next BeginPlay. Below 2, the server looks for shapes of lower energy while nothing changes. */
   UPROPERTY(EditAnywhere, Category = "Lpdeform", meta = (ClampMin = 1, ClampMax = 64))
   double P = 2;
-  /** Show such a shape at once. Otherwise a line of the log says that it is known. */
+  /** Show such a shape at once. Otherwise a line of the log says that it is known, and TakeBetterShape shows it. */
   UPROPERTY(EditAnywhere, Category = "Lpdeform")
   bool bShowBetterShapes = false;
   /** Write the distortion to the mesh's colours, from blue (none) to red. Counts from the next BeginPlay. */
   UPROPERTY(EditAnywhere, Category = "Lpdeform")
   bool bShowDistortion = false;
+
+  /** Shows the shape of lower energy that the log has announced. Waits for the server's answer. */
+  UFUNCTION(BlueprintCallable, Category = "Lpdeform")
+  void TakeBetterShape();
 
   void BeginPlay() override;
   void EndPlay(const EEndPlayReason::Type Reason) override;

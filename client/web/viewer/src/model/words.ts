@@ -13,10 +13,11 @@ export function short(value: number): string {
   return Number(value.toPrecision(3)).toString();
 }
 
-/** "7 %", "0.3 %"; at most 99. */
+/** "7 %", "0.3 %", rounded down. */
 export function percent(share: number): string {
-  const value = 100 * share;
-  return `${value < 1 ? short(Number(value.toPrecision(1))) : Math.min(Math.round(value), 99)}\u00a0%`;
+  const value = Math.min(Math.max(100 * share, 0), 99);
+  const step = value >= 1 || value === 0 ? 1 : 10 ** Math.floor(Math.log10(value));
+  return `${short(step * Math.floor(value / step + 1e-9))}\u00a0%`;
 }
 
 /**
