@@ -157,19 +157,21 @@ class LpdeformFollower {
 
   /// What the server says of itself or of a better shape, once when it changes; otherwise empty. A still better shape is a change.
   std::string notice() {
-    char text[512] = "";
-    const lpdeform_notice now = lpdeform_session_notice(session_, text, sizeof text);
+    // The shape first: one that comes or goes meanwhile is told, or not, by the next call.
     lpdeform_better_shape better{};
     better.struct_size = sizeof better;
-    if (now == LPDEFORM_NOTICE_BETTER_SHAPE) lpdeform_session_better_shape(session_, &better, nullptr);
+    const bool is_known = lpdeform_session_better_shape(session_, &better, nullptr) == LPDEFORM_OK;
+    char text[512] = "";
+    const lpdeform_notice now = lpdeform_session_notice(session_, text, sizeof text);
+    if ((now == LPDEFORM_NOTICE_BETTER_SHAPE) != is_known) return {};
     const bool is_same = now == noticed_ && better.energy == noticed_energy_;
     noticed_ = now;
     noticed_energy_ = better.energy;
     return is_same ? std::string() : std::string(text);
   }
 
-  /// Shows the shape of lower energy that notice() has announced, as a new frame. WAITS for the server's answer. False: problem() says
-  /// why.
+  /// Shows the shape of lower energy that notice() has announced, as a new frame. WAITS for the server's answer, 30 s at most. False:
+  /// problem() says why.
   bool take_better_shape() { return said(lpdeform_take_better_shape(session_, &error_)); }
 
  private:

@@ -277,7 +277,7 @@ struct MeshReport {
   std::vector<std::string> notices = {};
 };
 
-/// A state of the surface on its way to the optimum.
+/// A state of the surface on its way to the result.
 struct Frame {
   std::vector<double> positions = {};  // x, y, z of each vertex
   /// E_i of each vertex, in the mesh's unit of length; empty if it was not requested.

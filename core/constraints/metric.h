@@ -44,9 +44,9 @@ class Metric {
   /// not.
   using Admission = std::function<absl::Status(std::size_t bytes)>;
 
-  /// What a factorisation may take (operation_count), for n vertices: nothing interrupts it. A surface of a million vertices takes some
-  /// 4e10, of four million 3e11; 36,000 vertices in faces at random 2e12, which is minutes.
-  static double most_operations(std::int32_t n) { return std::max(2e11, 2e5 * n); }
+  /// The most multiplications that a factorisation for n vertices may take (operation_count), because nothing can interrupt one. A
+  /// surface of a million vertices takes some 4e10, of four million 3e11; 36,000 vertices in faces at random take 2e12.
+  static double most_operations(std::int32_t n) { return std::max(5e11, 2e5 * n); }
 
   /// Errors: FACTOR_TOO_LARGE (analyse_supernodes, most_operations), and those of `admit`, which is called with an estimate of
   /// memory_bytes() in single precision.

@@ -54,7 +54,7 @@ absl::StatusOr<SupernodePattern> analyse_supernodes(
 
 /// The number of entries that the supernodes hold, including explicit zeros.
 std::size_t entry_count(const SupernodePattern& supernodes);
-/// About how many multiplications a factorisation takes: the sum over its columns of the squared number of entries.
+/// How many multiplications a factorisation takes, up to a factor of two: the sum over its columns of the squared number of entries.
 double operation_count(const SupernodePattern& supernodes);
 
 /// Sparse Cholesky factorisation of symmetric positive definite matrices with the same pattern. The constructor does

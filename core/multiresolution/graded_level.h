@@ -19,7 +19,7 @@ class GradedLevel {
   /// What it holds of each of its vertices, beside its shape and solver: the pose before, constraints and shares.
   static constexpr std::size_t kBytesPerVertex = 140;
 
-  /// Which fine vertices such a level has in any case, for a state with the E_i^2 `squared_energies`. `largest_p` is the largest p_i. Empty if
+  /// Which fine vertices such a level has at least, for a state with the E_i^2 `squared_energies`. `largest_p` is the largest p_i. Empty if
   /// the distortion is spread so widely that the level would be too large, or if there is none.
   static std::vector<char> chosen(const CoarseLevel& coarse, const std::vector<double>& squared_energies,
                                   double largest_p);

@@ -72,9 +72,9 @@ class Deformer {
   /// Makes `positions` the current state, from which InitialGuess::kCurrent starts. Errors: as check_positions.
   /// Ends a running solve with kCancelled.
   absl::Status set_positions(const Points& positions);
-  /// Makes cell_energies() and the energies of summary() those of positions(), for the present handles and material; of soft terms
-  /// only where handles are set. Until a solve begins they are 0 otherwise, or those of the solve before. Ends a running solve with
-  /// kCancelled.
+  /// Makes cell_energies() and the energies of summary() those of positions(), for the present handles and material. Without this
+  /// call they stay those of the last solve, 0 if there was none, until the next one begins. Without handles, soft terms and footprints do
+  /// not count. Ends a running solve with kCancelled.
   void measure();
 
   /// Only for coarse levels: moves the current state by `by`, in the caller's units, and the levels below it in the same way. Not

@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/fault.h"
+#include "core/base/reasons.h"
 #include "core/base/workers.h"
 #include "server/given/surface.h"
 #include "server/runtime/random_name.h"
@@ -152,7 +153,9 @@ absl::StatusOr<std::shared_ptr<Session>> SessionFactory::make_again(const std::s
   const Decoder mesh_decoder = decoder(head.request, stored.owner).reading_stored(blobs);
   const absl::Status made = make_shape(head.request, mesh_decoder, parts);
   auto session = made.ok() ? finish(std::move(parts)) : made;
-  // The state was valid when it was saved, so an error here means damage.
+  // An earlier version, or one with another ordering, may have taken a mesh whose factorisation is too long for this one.
+  if (fault_of(session.status()).reason == Reason::kFactorTooLarge) return session;
+  // The rest of the state was valid when it was saved, so an error here means damage.
   if (absl::IsInvalidArgument(session.status()) || absl::IsFailedPrecondition(session.status()))
     return session_damaged(session.status());
   return session;

@@ -62,7 +62,7 @@ absl::Status ended_by(EndReason reason, const std::string& text) {
   return make_fault({why, "", ""}, text);
 }
 
-/// Finds the energies of the surface that a session begins with. Where its handles are refused, they are without those of soft handles.
+/// Finds the energies of the surface that a session begins with. If its handles are refused, the energies leave out soft handles.
 void measure(Deformer& deformer, const Inputs& inputs) {
   absl::Status status = deformer.set_material(*inputs.material);
   if (status.ok() && !inputs.handles->handles().empty()) status = deformer.set_handles(*inputs.handles);

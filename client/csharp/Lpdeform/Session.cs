@@ -55,9 +55,12 @@ namespace Lpdeform
         {
             get
             {
+                var better = NewBetterShape();
+                Native.lpdeform_session_better_shape(Pointer, ref better, null);
                 var text = new byte[512];
                 var reason = (NoticeReason)Native.lpdeform_session_notice(Pointer, text, (UIntPtr)(uint)text.Length);
-                var better = BetterShapeOf(reason);
+                if (reason != NoticeReason.BetterShape) better = NewBetterShape();
+                else if (better.SavedShare == 0) Native.lpdeform_session_better_shape(Pointer, ref better, null);  // it came just now
                 return new Notice
                 {
                     Reason = reason, Text = System.Text.Encoding.UTF8.GetString(text, 0, Array.IndexOf(text, (byte)0)),
@@ -66,11 +69,9 @@ namespace Lpdeform
             }
         }
 
-        Native.BetterShape BetterShapeOf(NoticeReason reason)
+        static Native.BetterShape NewBetterShape()
         {
-            var better = new Native.BetterShape { StructSize = (uint)sizeof(Native.BetterShape) };
-            if (reason == NoticeReason.BetterShape) Native.lpdeform_session_better_shape(Pointer, ref better, null);
-            return better;
+            return new Native.BetterShape { StructSize = (uint)sizeof(Native.BetterShape) };
         }
 
         /// Notice has changed, also where a still better shape is known. Raised by TryGetFrame, before it looks for a frame, on the thread that calls it.
@@ -87,11 +88,13 @@ namespace Lpdeform
         {
             var told = Noticed;
             if (told == null) return;
+            var better = NewBetterShape();
+            Native.lpdeform_session_better_shape(Pointer, ref better, null);
             var reason = (NoticeReason)Native.lpdeform_session_notice(Pointer, null, UIntPtr.Zero);
-            var better = BetterShapeOf(reason);
             if (IsNoticed(reason, better.InputSeq, better.Energy)) return;
             var notice = Notice;
             if (IsNoticed(notice.Reason, notice.InputSeq, notice.Energy)) return;
+            if (notice.Reason == NoticeReason.BetterShape && notice.SavedShare == 0) return;  // it has just gone
             noticed = notice;
             told(notice);
         }

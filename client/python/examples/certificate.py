@@ -1,4 +1,4 @@
-"""How far a result can be from the optimum, how it got there, and which other minima were seen."""
+"""How far a result can be from the optimum for its rotations, how it got there, and which other minima were seen."""
 
 import lpdeform
 from shapes import box

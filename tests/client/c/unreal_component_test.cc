@@ -119,6 +119,18 @@ TEST_F(UnrealComponent, KeepsHardEdgesAndShowsDistortion) {
   EXPECT_TRUE(is_red);
 }
 
+TEST_F(UnrealComponent, SaysThatThereIsNoBetterShapeToTake) {
+  EXPECT_FALSE(component_.TakeBetterShape());  // before the game begins
+  EXPECT_TRUE(unreal_logs.empty());
+  component_.BeginPlay();
+  tip_.transform = {FQuat(), FVector(1000, 50, 200)};
+  EXPECT_TRUE(tick_until([this] { return vertex(21).Z == 200; }));
+  EXPECT_FALSE(component_.TakeBetterShape());
+  component_.TickComponent(0.016F, LEVELTICK_All, nullptr);
+  ASSERT_EQ(unreal_logs.size(), 1u);
+  EXPECT_NE(unreal_logs[0].find("NO_BETTER_SHAPE"), std::string::npos) << unreal_logs[0];
+}
+
 TEST_F(UnrealComponent, SaysWhatIsRefusedOnceAndRests) {
   component_.mesh.mesh.SetVertex(5, FVector(NAN, 0, 0));
   component_.BeginPlay();

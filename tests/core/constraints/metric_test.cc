@@ -253,7 +253,7 @@ TEST(MetricOfFaceSoup, IsRefusedWhereAFactorisationTakesTooLong) {
   });
   const Fault fault = fault_of(refused.status());
   EXPECT_EQ(fault.reason, "FACTOR_TOO_LARGE");
-  EXPECT_EQ(fault.limit, "multiplications <= 2e+11");
+  EXPECT_EQ(fault.limit, "multiplications <= 5e+11");
   EXPECT_EQ(asked, 0u);  // no memory is asked for
 }
 

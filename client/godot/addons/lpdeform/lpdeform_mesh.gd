@@ -138,8 +138,8 @@ func begin() -> void:
 	update_configuration_warnings()
 
 
-## Shows the shape of lower energy that the output has announced. Waits for the server's answer. False if there was none, or if the server
-## does not answer; [signal failed] then says why.
+## Shows the shape of lower energy that the output has announced. Waits for the server's answer, 30 s at most. False if the mesh is not
+## live, if there is no such shape, or if the server does not answer; in the last two cases [signal failed] says why in the next frame.
 func take_better_shape() -> bool:
 	return _session != null and _session.take_better_shape()
 

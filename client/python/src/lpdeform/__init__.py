@@ -11,7 +11,8 @@
 on a server.
 
 To drag, call `s.drag("tip", ...)` on every mouse move and `s.poll()` once per picture: in both directions the newest value
-wins. `s.solve()` returns one finished result, with its trace and a bound on its distance from the optimum.
+wins. `s.solve()` returns one finished result, with its trace and a bound on its distance from the optimum for its
+rotations.
 """
 
 import importlib

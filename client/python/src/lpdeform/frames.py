@@ -1,4 +1,4 @@
-"""Frames: states of the surface on their way to the optimum."""
+"""Frames: states of the surface on their way to the result."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class FrameHeader(NamedTuple):
 
 
 class Frame:
-    """A state of the surface on its way to the optimum.
+    """A state of the surface on its way to the result.
 
     Arrays are read-only views of the received bytes, or of the solver's where it is in this process; copy them to change them. For a quantized frame they are computed when they
     are first read.

@@ -1,4 +1,4 @@
-// One finished result, with how it came about and how far it can be from the optimum.
+// One finished result, with how it came about and how far it can be from the optimum for its rotations.
 //
 //   node examples/solve.ts http://localhost:8080
 import { openSession } from "lpdeform-client";

@@ -103,8 +103,8 @@ void ULpdeformComponent::Move(FLpdeformHandle& Handle) {
   if (bTaken) Handle.Sent = Here;
 }
 
-void ULpdeformComponent::TakeBetterShape() {
-  if (Follower) Follower->take_better_shape();  // the next tick says what was wrong
+bool ULpdeformComponent::TakeBetterShape() {
+  return Follower && Follower->take_better_shape();  // the next tick says what was wrong
 }
 
 /** Once a picture. Nothing here waits for the network. */

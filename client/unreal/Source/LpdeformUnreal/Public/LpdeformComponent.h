@@ -46,9 +46,12 @@ class LPDEFORMUNREAL_API ULpdeformComponent : public UDynamicMeshComponent {
   UPROPERTY(EditAnywhere, Category = "Lpdeform")
   bool bShowDistortion = false;
 
-  /** Shows the shape of lower energy that the log has announced. Waits for the server's answer. */
+  /**
+   * Shows the shape of lower energy that the log has announced. Waits for the server's answer, 30 s at most. False if the component is
+   * not live, if there is no such shape, or if the server does not answer; in the last two cases the log says why.
+   */
   UFUNCTION(BlueprintCallable, Category = "Lpdeform")
-  void TakeBetterShape();
+  bool TakeBetterShape();
 
   void BeginPlay() override;
   void EndPlay(const EEndPlayReason::Type Reason) override;
