@@ -42,11 +42,11 @@ absl::StatusOr<Metric> Metric::create(std::shared_ptr<const RestShape> shape, co
   if (!supernodes.ok()) return supernodes.status();
   const double operations = operation_count(*supernodes), most = most_operations(shape->vertex_count());
   if (operations > most) {
-    return make_fault(
-        {Reason::kFactorTooLarge, "mesh", absl::StrFormat("multiplications <= %.3g", most)},
-        absl::StrFormat("Factoring this mesh's matrix would take %.3g multiplications; the limit for %d vertices is %.3g. Use a mesh with "
-                        "fewer vertices, or one whose faces form a surface.",
-                        operations, shape->vertex_count(), most));
+    return make_fault({Reason::kFactorTooLarge, "mesh", absl::StrFormat("multiplications <= %.3g", most)},
+                      absl::StrFormat("Factoring this mesh's matrix would take %.3g multiplications; the "
+                                      "limit for %d vertices is %.3g. Use a mesh with "
+                                      "fewer vertices, or one whose faces form a surface.",
+                                      operations, shape->vertex_count(), most));
   }
   if (admit) {
     absl::Status status =
