@@ -112,8 +112,8 @@ it("one better shape is offered by what it saves, several by the most that one o
 });
 
 it("what a better shape saves is rounded down", () => {
-  expect([0, 1e-6, 0.003, 0.0096, 0.0149, 0.066, 0.07, 0.999].map(percent)).toEqual(
-    [0, 0.0001, 0.3, 0.9, 1, 6, 7, 99].map((value) => `${value}\u00a0%`),
+  expect([0, 0.00012, 0.003, 0.0096, 0.0149, 0.066, 0.07, 0.999].map(percent)).toEqual(
+    [0, 0.01, 0.3, 0.9, 1, 6, 7, 99].map((value) => `${value}\u00a0%`),
   );
 });
 
