@@ -1,6 +1,5 @@
 #include "core/base/fault.h"
 
-#include <charconv>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -8,6 +7,7 @@
 #include "absl/strings/cord.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "absl/strings/str_split.h"
 #include "core/base/reasons.h"
 
@@ -30,11 +30,13 @@ absl::Status make_fault(absl::StatusCode code, NewFault fault, std::string_view 
 
 std::string exact(double number) {
   std::string text = absl::StrCat(number);
-  double read = 0;
-  if (std::isnan(number) || (absl::SimpleAtod(text, &read) && read == number)) return text;
-  char digits[32];
-  const auto end = std::to_chars(digits, digits + sizeof(digits), number);
-  return {digits, end.ptr};
+  const auto reads_back = [&] {
+    double read = 0;
+    return std::isnan(number) || (absl::SimpleAtod(text, &read) && read == number);
+  };
+  for (int digits = 15; digits <= 17 && !reads_back(); ++digits)
+    text = absl::StrFormat("%.*g", digits, number);
+  return text;
 }
 
 Fault fault_of(const absl::Status& status) {

@@ -22,7 +22,7 @@ client::SolveResult searched(std::uint32_t effort, std::uint32_t starts, std::ve
   return result;
 }
 
-TEST(SearchText, CountsTheStartsThatConvergedAndTheEnergiesThatDiffer) {
+TEST(SearchText, CountsTheStartsThatEndedInAMinimumAndTheEnergiesThatDiffer) {
   EXPECT_EQ(search_text(searched(1, 8, {8.004, 7, 7.001, 7.5})),
             "looked for lower minima from 8 further starts, of which 4 ended in a minimum; minima of 3 "
             "energies were "
