@@ -34,6 +34,16 @@ struct LpdeformShape {
   std::vector<std::uint32_t> indices;  // three per triangle
 };
 
+/// How the server looks for shapes of lower energy while nothing changes. Below p = 2 there are many minima.
+struct LpdeformSearch {
+  /// A shape that it finds is shown at once. Otherwise LpdeformFollower::notice() says that there is one.
+  bool shows = false;
+  /// 12 times as many starts, up to 1000; 0: none. Negative: the server decides, which takes 1 where p is below 2, and otherwise 0.
+  int effort = -1;
+  /// The share of the energy that such a shape must save, up to 1; 0 means 0.02.
+  double least_share = 0;
+};
+
 /// A session for an engine's component, in C++17 around lpdeform.h. No function waits for the network, except take_better_shape(), and
 /// the destructor, for at most about two seconds. The constructor throws std::runtime_error; later errors are texts.
 class LpdeformFollower {
@@ -106,14 +116,15 @@ class LpdeformFollower {
     return said(lpdeform_move_handle(session_, name, &motion, nullptr, &error_));
   }
 
-  /// p, 1 to 64, everywhere. `shows_better`: a shape of lower energy that the server finds while nothing changes is shown at once;
-  /// otherwise notice() says that there is one. Below p = 2 there are many minima. Does not wait.
-  bool set(double p, bool shows_better) {
+  /// p, 1 to 64, everywhere. Does not wait. False: problem() says why.
+  bool set(double p, const LpdeformSearch& search) {
     lpdeform_settings settings{};
     settings.struct_size = sizeof settings;
     settings.p = p;
     settings.set_solver = settings.set_search = 1;
-    settings.search_shows = shows_better ? 1 : 0;
+    settings.search_effort = search.effort < 0 ? 0 : search.effort == 0 ? -1 : search.effort;
+    settings.search_shows = search.shows ? 1 : 0;
+    settings.search_least_share = search.least_share;
     return said(lpdeform_set(session_, &settings, nullptr, &error_));
   }
 

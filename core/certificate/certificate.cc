@@ -18,11 +18,6 @@ using Clock = std::chrono::steady_clock;
 constexpr double kLongestSeconds = 1e6;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// t of the maximum in f*(y) = max_t y t - k t^p, for p > 1: |y| = k p t^{p - 1}.
-double conjugate_point(double y, double k, double p) {
-  return std::pow(y / (k * p), 1 / (p - 1));
-}
-
 /// argmin over t >= 0 of k t^p + (rho / 2) (t - v)^2.
 double shrink(double v, double k, double p, double rho) {
   if (p == 1) return std::max(0.0, v - k / rho);
@@ -49,23 +44,28 @@ class DualBound {
   /// max over theta >= 0 of D(theta y), for y with A^T y = 0.
   double scaled_bound(const EdgeVectors& y) {
     conjugates_.assign(step_.count(), 0);
+    largest_ = 0;
     double longest_theta = 2;
     for (std::int32_t i = 0; i < step_.count(); ++i) {
       const double norm = step_.norm(y, i);
-      if (norm == 0) continue;
       if (p(i) > 1)
-        conjugates_[i] = norm * conjugate_point(norm, k(i), p(i));
-      else
+        largest_ = std::max(largest_, ratio(norm, i));
+      else if (norm > 0)
         longest_theta = std::min(longest_theta, k(i) / norm);
     }
+    if (largest_ == 0) largest_ = 1;
+    for (std::int32_t i = 0; i < step_.count(); ++i) {
+      const double norm = step_.norm(y, i);
+      if (p(i) > 1 && norm > 0) conjugates_[i] = norm * std::pow(ratio(norm, i) / largest_, 1 / (p(i) - 1));
+    }
     inner_ = y.cwiseProduct(z_).sum();
-    double low = 0, high = longest_theta;
+    double low = 0, high = longest_theta * largest_;
     for (int step = 0; step < 60; ++step) {
-      const double theta = step == 0 ? high : 0.5 * (low + high);
-      if (slope(theta) >= 0)
-        low = theta;
+      const double tau = step == 0 ? high : 0.5 * (low + high);
+      if (slope(tau) >= 0)
+        low = tau;
       else
-        high = theta;
+        high = tau;
       if (low == high) break;
     }
     return value(low);
@@ -75,28 +75,33 @@ class DualBound {
   double k(std::int32_t i) const { return step_.coefficient(i); }
 
  private:
-  // f_i*(theta y_i) = (1 - 1/p_i) theta^{p_i / (p_i - 1)} |y_i| t_i, where t_i is the conjugate point of |y_i|.
-  double slope(double theta) const {
+  double ratio(double norm, std::int32_t i) const { return norm / (k(i) * p(i)); }
+
+  // f_i*(y) = max_t |y| t - k t^p has its maximum where t^{p - 1} is the ratio. With theta = tau / largest_,
+  // f_i*(theta y_i) = (1 - 1/p_i) theta tau^{1 / (p_i - 1)} conjugates_[i]. The powers of the ratios themselves would overflow near p = 1.
+  double slope(double tau) const {
     double sum = inner_, power = 0, of_p = 0;
     for (std::int32_t i = 0; i < step_.count(); ++i) {
       if (conjugates_[i] == 0) continue;
-      if (p(i) != of_p) of_p = p(i), power = std::pow(theta, 1 / (of_p - 1));
+      if (p(i) != of_p) of_p = p(i), power = std::pow(tau, 1 / (of_p - 1));
       sum -= power * conjugates_[i];
     }
     return sum;
   }
-  double value(double theta) const {
+  double value(double tau) const {
+    const double theta = tau / largest_;
     double sum = theta * inner_;
     for (std::int32_t i = 0; i < step_.count(); ++i) {
       if (conjugates_[i] == 0) continue;
-      sum -= (1 - 1 / p(i)) * std::pow(theta, p(i) / (p(i) - 1)) * conjugates_[i];
+      sum -= (1 - 1 / p(i)) * theta * std::pow(tau, 1 / (p(i) - 1)) * conjugates_[i];
     }
     return std::isfinite(sum) ? sum : -kInfinity;
   }
 
   const ConvexRows& step_;
   const EdgeVectors& z_;
-  std::vector<double> conjugates_;  // |y_i| t_i
+  std::vector<double> conjugates_;  // |y_i| (ratio / largest_)^{1 / (p_i - 1)}
+  double largest_ = 1;              // of the ratios |y_i| / (k_i p_i)
   double inner_ = 0;
 };
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -30,6 +31,20 @@ absl::Status dependent(const std::string& owner, const std::string& other) {
                                  ", or contradicts it; hold one of the two"));
 }
 
+absl::Status too_many(const std::vector<LinearRow>& rows) {
+  std::map<std::string, std::size_t> counts;
+  for (const LinearRow& row : rows) ++counts[row.owner];
+  const auto by_count = [](const auto& a, const auto& b) { return a.second < b.second; };
+  const auto& [owner, most] = *std::max_element(counts.begin(), counts.end(), by_count);
+  return make_fault(
+      {Reason::kTooManyLocks, absl::StrCat("handle \"", owner, "\""),
+       absl::StrCat("equations <= ", LinearConstraints::kMostRows)},
+      absl::StrCat("points inside faces and locks make ", rows.size(), " equations, most of them handle \"",
+                   owner, "\" (", most,
+                   "): 3 a point, 2 a vertex locked to an axis, 1 a vertex locked to a plane; there may be ",
+                   LinearConstraints::kMostRows));
+}
+
 }  // namespace
 
 struct LinearConstraints::Factors {
@@ -43,13 +58,7 @@ absl::StatusOr<LinearConstraints> LinearConstraints::create(std::vector<LinearRo
                                                             const std::vector<char>& is_held) {
   LinearConstraints result;
   if (rows.empty()) return result;
-  if (rows.size() > kMostRows) {
-    return make_fault({Reason::kTooManyLocks, "", absl::StrCat("equations <= ", kMostRows)},
-                      absl::StrCat("points inside faces and locks make ", rows.size(),
-                                   " equations, 3 a point, 2 a vertex "
-                                   "locked to an axis, 1 a vertex locked to a plane; there may be ",
-                                   kMostRows));
-  }
+  if (rows.size() > kMostRows) return too_many(rows);
   result.rows_ = std::move(rows);
   result.is_held_ = is_held;
   if (absl::Status status = result.factor(); !status.ok()) return status;

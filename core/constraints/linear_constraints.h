@@ -31,7 +31,7 @@ class LinearConstraints {
  public:
   LinearConstraints() = default;
 
-  /// Errors, INVALID_ARGUMENT: TOO_MANY_LOCKS (over kMostRows rows); HANDLE_CONSTRAINTS_DEPENDENT if a row follows from
+  /// Errors, INVALID_ARGUMENT: TOO_MANY_LOCKS (over kMostRows rows; names the handle that has the most); HANDLE_CONSTRAINTS_DEPENDENT if a row follows from
   /// other rows and held vertices, or contradicts them; names both handles.
   static absl::StatusOr<LinearConstraints> create(std::vector<LinearRow> rows,
                                                   const std::vector<char>& is_held);

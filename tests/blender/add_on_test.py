@@ -490,6 +490,21 @@ class AddOn(unittest.TestCase):
         self.assertGreater(np.abs(now - even).max(), 0.005)  # p = 1 counts
         stage.turn(lambda: live.message(self.tube) == "")
 
+    def test_how_far_to_look_for_lower_minima_is_told_when_it_changes(self):
+        self.held()
+        stage.settle(self.tube)
+        running = live.of(self.tube)
+        self.assertEqual(running._told.last("solver").value, (None, False, 0.02))
+        before = running.session.newest_input
+        self.tube.lpdeform.search_effort = 0
+        self.tube.lpdeform.search_percent = 50
+        self.tube.lpdeform.search_shows = True
+        stage.settle(self.tube)
+        self.assertEqual(running.session.newest_input, before + 1)
+        self.assertEqual(running._told.last("solver").value, (0, True, 0.5))
+        self.assertEqual(bpy.ops.lpdeform.solve(), {"FINISHED"})
+        self.assertEqual(running.result.effort, 0)
+
     def test_p_by_shape_a_region_and_a_bound(self):
         self.tube.lpdeform.certify = True
         _, tip = self.held()

@@ -114,6 +114,30 @@ static class SampleTest
         Send(sample, "OnDisable");
     }
 
+    static void HowFarToLookIsSentWhereItChangesAndARefusalIsSaidOnce()
+    {
+        UnityEngine.Mesh mesh;
+        var sample = Sample(out mesh);
+        sample.searchEffort = 3;
+        Send(sample, "OnEnable");
+        sample.handles[1].transform.position.y = 2;
+        UpdateUntil(sample, () => mesh.vertices[20].y == 2, "the session is live");
+        Expect(UnityEngine.Debug.Warnings.Count == 0, "no warnings");
+        sample.searchEffort = 1001;
+        UpdateUntil(sample, () => UnityEngine.Debug.Warnings.Count > 0, "the refusal");
+        for (int k = 0; k < 50; ++k) Send(sample, "Update");
+        Expect(UnityEngine.Debug.Warnings.Single().Contains("1001"), UnityEngine.Debug.Warnings[0]);
+        sample.searchEffort = 0;
+        sample.leastShare = 1.5f;
+        UpdateUntil(sample, () => UnityEngine.Debug.Warnings.Count > 1, "the other refusal");
+        Expect(UnityEngine.Debug.Warnings.Count == 2 && UnityEngine.Debug.Warnings[1].Contains("1.5"), "the share");
+        sample.leastShare = 0.05f;
+        sample.handles[1].transform.position.y = 3;
+        UpdateUntil(sample, () => mesh.vertices[20].y == 3, "it goes on");
+        Expect(UnityEngine.Debug.Warnings.Count == 2, "nothing more");
+        Send(sample, "OnDisable");
+    }
+
     static void DisablingPutsTheMeshBackAndEnablingGoesOnFromThere()
     {
         UnityEngine.Mesh mesh;
@@ -196,6 +220,7 @@ static class SampleTest
     {
         var tests = new Action[] { TheMeshFollowsItsHandles, AHandleThatHoldsNothingIsSaidOnceAndNeverMoved, PIsSentAgainToANewSession,
                                    TakingABetterShapeWhereNoneIsKnownIsAWarning,
+                                   HowFarToLookIsSentWhereItChangesAndARefusalIsSaidOnce,
                                    DisablingPutsTheMeshBackAndEnablingGoesOnFromThere, AnUpdateWithoutNewsMakesNoGarbage,
                                    ARefusalIsSaidOnceAndShown, TheSwingingBarSwings };
         using (server = new Server(arguments[0]))

@@ -304,7 +304,7 @@ func checks_calls_without_types() -> void:
 	expect(wrong is String and "three a triangle" in wrong, "two indices: " + str(wrong))
 	wrong = session.open(_address, "", false, PackedVector3Array([Vector3.ZERO]), PackedVector3Array([Vector3.UP, Vector3.UP]), PackedInt32Array())
 	expect("normals" in wrong, "too many normals: " + str(wrong))
-	expect(session.call("set_p", 2, true) == false, "an int is taken as a float")
+	expect(session.call("set_p", 2, true, 4, 0.1) == false, "an int is taken as a float")
 
 
 func measures_a_frame() -> void:

@@ -19,7 +19,9 @@ _messages: dict = {}
 """The last message about a mesh object."""
 
 
-_settings = ("p", "stiffness", "region")
+_painted = ("p", "stiffness", "region")
+"""Settings that a vertex group can be chosen for."""
+_settings = (*_painted, "solver")
 _resize = "resize"
 """This is also the name of the handle that the server makes of it."""
 _taken_all_the_same = ("FAILED_PRECONDITION", "ABORTED")
@@ -274,6 +276,9 @@ class LiveMesh:
                 present[name] = Present(("automatic", strength), setting=lpdeform.Automatic(strength))
             else:
                 present[name] = Present(field.tobytes(), setting=field)
+        effort = settings.search_effort if settings.search_effort >= 0 else None
+        search = (effort, settings.search_shows, settings.search_percent / 100)
+        present["solver"] = Present(search, setting=lpdeform.SolverSettings(search=lpdeform.MinimaSearch(*search)))
         region = self._weights["region"]
         may_move = np.flatnonzero(region > 0.5) if region is not None else np.zeros(0, int)
         if len(may_move) or self._told.last("region") is not None:
@@ -283,7 +288,7 @@ class LiveMesh:
     def _read_weights(self, ob) -> None:
         """Reading loops over all vertices. So it is done when an operator that has touched the mesh ends: a stroke is one."""
         settings = ob.lpdeform
-        names = {name: getattr(settings, f"{name}_group") for name in _settings}
+        names = {name: getattr(settings, f"{name}_group") for name in _painted}
         operator = _newest_operator()
         is_painted = self._is_touched and operator != self._operator
         if is_painted or self._weights.get("names") != names:

@@ -99,6 +99,17 @@ class MaterialPanel(_Below, bpy.types.Panel):
         self.layout.prop(ob.lpdeform, "certify")
 
 
+class SearchPanel(_Below, bpy.types.Panel):
+    bl_idname = "VIEW3D_PT_lpdeform_search"
+    bl_label = "Lower minima"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context) -> None:
+        self.layout.use_property_split = True
+        for name in ("search_effort", "search_percent", "search_shows"):
+            self.layout.prop(mesh_of(context).lpdeform, name)
+
+
 class HandlePanel(_Below, bpy.types.Panel):
     bl_idname = "VIEW3D_PT_lpdeform_handle"
     bl_label = "Handle"
@@ -131,4 +142,4 @@ class DistortionPanel(_Below, bpy.types.Panel):
             self.layout.prop(settings, "distortion_limit")
 
 
-register, unregister = bpy.utils.register_classes_factory((MainPanel, MaterialPanel, HandlePanel, DistortionPanel))
+register, unregister = bpy.utils.register_classes_factory((MainPanel, MaterialPanel, SearchPanel, HandlePanel, DistortionPanel))

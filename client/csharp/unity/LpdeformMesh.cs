@@ -30,6 +30,11 @@ public sealed class LpdeformMesh : MonoBehaviour
     /// A shape of lower energy that the server finds while nothing moves is shown at once. Otherwise the log says that there is
     /// one, and "Take the better shape" in the component's menu shows it.
     public bool showBetterShapes;
+    /// How far the server looks for such shapes while nothing moves: 12 times as many starts, and none at 0. At -1 the server decides:
+    /// 1 where p is below 2, otherwise 0.
+    [Range(-1, 1000)] public int searchEffort = -1;
+    /// The share of the energy that such a shape must save; 0 is the server's own, 0.02.
+    [Range(0, 1)] public float leastShare = 0.02f;
     public HandleObject[] handles = new HandleObject[0];
 
     Client client;
@@ -41,7 +46,7 @@ public sealed class LpdeformMesh : MonoBehaviour
     Vector3[] positions, normals;
     Color32[] colours;
     float sentP;
-    bool? sentShowBetterShapes;
+    MinimaSearch? sentSearch;
 
     /// The session's state for the Inspector: "Live", or "Refused: " and the reason.
     public string status = "";
@@ -50,7 +55,7 @@ public sealed class LpdeformMesh : MonoBehaviour
     void OnEnable()
     {
         sentP = 0;  // a new session knows nothing
-        sentShowBetterShapes = null;
+        sentSearch = null;
         status = "";
         said = null;
         var present = GetComponent<MeshFilter>().mesh;  // this object's own copy
@@ -135,10 +140,14 @@ public sealed class LpdeformMesh : MonoBehaviour
                 session.Set(p: p);
                 sentP = p;
             }
-            if (showBetterShapes != sentShowBetterShapes)
+            var search = new MinimaSearch
             {
-                session.SetSolver(new SolverSettings { Search = new MinimaSearch { Show = showBetterShapes } });
-                sentShowBetterShapes = showBetterShapes;
+                Show = showBetterShapes, LeastShare = leastShare, Effort = searchEffort < 0 ? (int?)null : searchEffort
+            };
+            if (sentSearch == null || !Same(search, sentSearch.Value))
+            {
+                sentSearch = search;  // also if it is refused: that is said once
+                session.SetSolver(new SolverSettings { Search = search });
             }
             Frame frame;
             var buffers = new FrameBuffers { Positions = Floats(positions), Normals = Floats(normals), Colours = Bytes(colours) };
@@ -205,6 +214,11 @@ public sealed class LpdeformMesh : MonoBehaviour
         if (Same(motion, handle.sent)) return;
         session.Handles.Move(handle.name, motion);
         handle.sent = motion;
+    }
+
+    static bool Same(MinimaSearch a, MinimaSearch b)
+    {
+        return a.Show == b.Show && a.Effort == b.Effort && a.LeastShare == b.LeastShare;
     }
 
     /// Without the allocation of Equals(object).

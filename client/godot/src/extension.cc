@@ -15,7 +15,7 @@ const std::vector<godot::Method>& session_methods() {
       method<&Session::hold>("hold", {"name", "vertices"}),
       method<&Session::let_go>("let_go", {"name"}),
       method<&Session::move>("move", {"name", "rotation", "translation"}),
-      method<&Session::set_p>("set_p", {"p", "shows_better"}),
+      method<&Session::set_p>("set_p", {"p", "shows_better", "effort", "least_share"}),
       method<&Session::take_better_shape>("take_better_shape"),
       method<&Session::tick>("tick"),
       method<&Session::positions>("positions"),

@@ -202,6 +202,13 @@ void Passed<bool>::write(const bool& value, GDExtensionTypePtr to) {
   *static_cast<GDExtensionBool*>(to) = value ? 1 : 0;
 }
 
+std::int64_t Passed<std::int64_t>::read(GDExtensionConstTypePtr from) {
+  return *static_cast<const std::int64_t*>(from);
+}
+void Passed<std::int64_t>::write(const std::int64_t& value, GDExtensionTypePtr to) {
+  *static_cast<std::int64_t*>(to) = value;
+}
+
 double Passed<double>::read(GDExtensionConstTypePtr from) {
   return *static_cast<const double*>(from);
 }

@@ -39,6 +39,7 @@ struct Passed;
     static void write(const TYPE& value, GDExtensionTypePtr to);                             \
   };
 GODOT_PASSED(bool, BOOL)
+GODOT_PASSED(std::int64_t, INT)
 GODOT_PASSED(double, FLOAT)
 GODOT_PASSED(std::string, STRING)
 GODOT_PASSED(Vector3, VECTOR3)

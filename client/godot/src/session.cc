@@ -1,6 +1,7 @@
 #include "session.h"
 
 #include <algorithm>
+#include <limits>
 
 std::string Session::open(const std::string& address, const std::string& token, bool tls,
                           const godot::Vectors& positions, const godot::Vectors& normals,
@@ -34,8 +35,10 @@ bool Session::move(const std::string& name, const godot::Quaternion& rotation,
   return follower_ && follower_->move(name.c_str(), turn, shift);
 }
 
-bool Session::set_p(double p, bool shows_better) {
-  return follower_ && follower_->set(p, shows_better);
+bool Session::set_p(double p, bool shows_better, std::int64_t effort, double least_share) {
+  constexpr std::int64_t kMost = std::numeric_limits<int>::max();
+  const int starts = static_cast<int>(std::clamp<std::int64_t>(effort, -1, kMost));
+  return follower_ && follower_->set(p, {shows_better, starts, least_share});
 }
 
 bool Session::take_better_shape() {

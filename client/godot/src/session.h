@@ -2,6 +2,7 @@
 
 #include <lpdeform_follower.h>
 
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -22,8 +23,8 @@ class Session {
   bool let_go(const std::string& name);
   /// Takes each vertex x of the handle at rest to rotation x + translation.
   bool move(const std::string& name, const godot::Quaternion& rotation, const godot::Vector3& translation);
-  /// See LpdeformFollower::set.
-  bool set_p(double p, bool shows_better);
+  /// See LpdeformFollower::set and LpdeformSearch.
+  bool set_p(double p, bool shows_better, std::int64_t effort, double least_share);
   /// See LpdeformFollower::take_better_shape.
   bool take_better_shape();
   /// Once per picture. True if positions(), normals() and colours() are new.

@@ -97,7 +97,7 @@ class FollowerOfABentBar : public testing::Test {
 };
 
 TEST_F(FollowerOfABentBar, ShowsABetterShapeWhereThatIsAskedFor) {
-  EXPECT_TRUE(follower_->set(1.5, true));
+  EXPECT_TRUE(follower_->set(1.5, {.shows = true}));
   const auto is_result = [this] {
     return follower_->frame().is_final == 1 && follower_->frame().input_seq == 4;
   };
@@ -110,7 +110,7 @@ TEST_F(FollowerOfABentBar, ShowsABetterShapeWhereThatIsAskedFor) {
 TEST_F(FollowerOfABentBar, SaysOnceThatABetterShapeIsKnownAndTakesIt) {
   EXPECT_FALSE(follower_->take_better_shape());
   EXPECT_FALSE(follower_->problem().empty());
-  EXPECT_TRUE(follower_->set(1.5, false));
+  EXPECT_TRUE(follower_->set(1.5, {}));
   std::string said;
   const auto says_it = [&] { return (said = follower_->notice()).find("energy") != std::string::npos; };
   ASSERT_TRUE(tick_until(says_it)) << said << follower_->problem();
@@ -118,6 +118,38 @@ TEST_F(FollowerOfABentBar, SaysOnceThatABetterShapeIsKnownAndTakesIt) {
   const double first = follower_->frame().energy;
   ASSERT_TRUE(follower_->take_better_shape()) << follower_->problem();
   EXPECT_TRUE(tick_until([&] { return follower_->frame().energy < 0.98 * first; }));
+}
+
+TEST_F(FollowerOfABentBar, LooksNoFartherThanItIsTold) {
+  std::string problem;
+  const auto is_refused = [&] { return !(problem = follower_->problem()).empty(); };
+  std::uint64_t changes =
+      3;  // those that hold and move the bar, which are sent before others can be refused together with them
+  const auto is_result = [&] {
+    return follower_->frame().is_final == 1 && follower_->frame().input_seq == changes;
+  };
+  ASSERT_TRUE(tick_until(is_result));
+  EXPECT_TRUE(follower_->set(1.5, {.effort = 1001}));  // the server refuses it later
+  ASSERT_TRUE(tick_until(is_refused));
+  EXPECT_NE(problem.find("1001"), std::string::npos) << problem;
+  EXPECT_TRUE(follower_->set(1.5, {.least_share = 1.5}));
+  ASSERT_TRUE(tick_until(is_refused));
+  EXPECT_NE(problem.find("1.5"), std::string::npos) << problem;
+  changes = 5;
+  // No shape saves this share, and then no start is made. A shape that saves the usual share is found in about a second.
+  for (const LpdeformSearch& little :
+       {LpdeformSearch{.shows = true, .least_share = 0.5}, LpdeformSearch{.shows = true, .effort = 0}}) {
+    EXPECT_TRUE(follower_->set(1.5, little));
+    ++changes;
+    ASSERT_TRUE(tick_until(is_result)) << follower_->problem();
+    const double first = follower_->frame().energy;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(4);
+    while (std::chrono::steady_clock::now() < end) {
+      if (!follower_->tick()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      ASSERT_GT(follower_->frame().energy, 0.98 * first);
+      ASSERT_EQ(follower_->notice(), "");
+    }
+  }
 }
 
 }  // namespace

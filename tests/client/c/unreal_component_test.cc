@@ -131,6 +131,19 @@ TEST_F(UnrealComponent, SaysThatThereIsNoBetterShapeToTake) {
   EXPECT_NE(unreal_logs[0].find("NO_BETTER_SHAPE"), std::string::npos) << unreal_logs[0];
 }
 
+TEST_F(UnrealComponent, TellsTheServerHowFarToLook) {
+  component_.LeastShare = 1.5;  // refused, so that the log shows what was sent
+  component_.BeginPlay();
+  EXPECT_TRUE(tick_until([] { return unreal_logs.size() == 1; }));
+  EXPECT_NE(unreal_logs[0].find("1.5"), std::string::npos) << unreal_logs[0];
+  component_.EndPlay(EEndPlayReason::Destroyed);
+  component_.LeastShare = 0.02;
+  component_.SearchEffort = 1001;
+  component_.BeginPlay();
+  EXPECT_TRUE(tick_until([] { return unreal_logs.size() == 2; }));
+  EXPECT_NE(unreal_logs[1].find("1001"), std::string::npos) << unreal_logs[1];
+}
+
 TEST_F(UnrealComponent, SaysWhatIsRefusedOnceAndRests) {
   component_.mesh.mesh.SetVertex(5, FVector(NAN, 0, 0));
   component_.BeginPlay();

@@ -66,6 +66,16 @@ TEST_F(CertificateTest, IsTightAtTheMinimum) {
   }
 }
 
+TEST_F(CertificateTest, IsTightWherePIsBarelyAboveOne) {
+  for (const double p : {1 + 1e-9, 1 + 1e-6, 1 + 1e-3}) {
+    const Material material = Material::uniform(p);
+    const LpNorm norm = this->norm(material);
+    const Points x = solved(material, 1e-9);
+    objective.evaluate(x, norm);
+    EXPECT_LT(relative_gap(problem(norm), x), 1e-3) << "p = 1 + " << p - 1;
+  }
+}
+
 TEST_F(CertificateTest, IsTightWithStiffnessThatVariesByMillions) {
   for (const double p : {1.0, 2.0, 6.0}) {
     const Material material = of_varying_stiffness(p);

@@ -372,7 +372,7 @@ TEST_F(HoldTest, RefusesMoreLocksThanItCanTake) {
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::int32_t>(i);
   ASSERT_TRUE(handles.set("all", {all, Fixed{}, PlaneLock{}}).ok());
   EXPECT_EQ(fault_of(Deformer::create(rest_shape(plane), {}).value()->set_handles(handles)),
-            (Fault{"TOO_MANY_LOCKS", "", "equations <= 1024"}));
+            (Fault{"TOO_MANY_LOCKS", "handle \"all\"", "equations <= 1024"}));
 }
 
 }  // namespace

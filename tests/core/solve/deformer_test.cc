@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <string>
 
@@ -173,6 +174,33 @@ TEST_F(DeformerTest, MeasuresPositionsThatWereSet) {
   ASSERT_TRUE(free->set_positions(2 * bar.vertices).ok());
   free->measure();
   EXPECT_GT(free->summary().energy, 0);
+}
+
+TEST_F(DeformerTest, AdmissionCountsTheCoarseLevelsOfMeshesOf5000Vertices) {
+  for (const int side : {71, 99}) {
+    const TriangleMesh sheet = grid(side, side);
+    HandleSet handles;
+    ASSERT_TRUE(handles.set("left", {slice(sheet, 0, 0, 2), Fixed{}}).ok());
+    const auto turned = turn(Eigen::Vector3d::UnitY(), 60, {side / 2.0, 0, 0});
+    ASSERT_TRUE(handles.set("right", {slice(sheet, 0, side - 2, side), turned}).ok());
+    for (const double p : {1.0, 1.5, 6.0}) {
+      std::size_t admitted = 0, most = 0;
+      const auto admit = [&](std::size_t bytes) {
+        admitted = bytes;
+        return absl::OkStatus();
+      };
+      const auto solver = Deformer::create(rest_shape(sheet), {.admit = admit}).value();
+      ASSERT_TRUE(solver->set_material(Material::uniform(p)).ok());
+      ASSERT_TRUE(solver->set_handles(handles).ok());
+      SolveSettings settings;
+      settings.initial = InitialGuess::kLaplacian;
+      settings.max_iterations = 200;
+      ASSERT_TRUE(solver->start(settings).ok());
+      while (solver->step()) most = std::max(most, solver->memory_bytes());
+      EXPECT_LE(most, admitted) << sheet.vertices.rows() << " vertices, p = " << p;
+      EXPECT_LT(admitted, 2 * most) << sheet.vertices.rows() << " vertices, p = " << p;
+    }
+  }
 }
 
 TEST_F(DeformerTest, SaysStalledWhereNoStepHelpsShortOfTheTolerance) {

@@ -53,6 +53,19 @@ signal failed(text: String)
 		show_better_shapes = value
 		_set_p()
 
+## How far the server looks for such shapes while nothing changes: 12 times as many starts, and none at 0. At -1 the server decides:
+## 1 where p is below 2, otherwise 0.
+@export_range(-1, 1000) var search_effort := -1:
+	set(value):
+		search_effort = value
+		_set_p()
+
+## The share of the energy that such a shape must save; 0 is the server's own, 0.02.
+@export_range(0, 1, 0.001) var least_share := 0.02:
+	set(value):
+		least_share = value
+		_set_p()
+
 ## Show the distortion as colours from blue (none) to red, in place of the materials of [member source].
 @export var show_distortion := false:
 	set(value):
@@ -209,7 +222,7 @@ func _process(_seconds: float) -> void:
 
 func _set_p() -> void:
 	if _session:
-		_session.set_p(p, show_better_shapes)
+		_session.set_p(p, show_better_shapes, search_effort, least_share)
 
 
 func _follow_handles() -> void:

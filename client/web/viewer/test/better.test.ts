@@ -1,5 +1,5 @@
 import { afterEach, expect, it, vi } from "vitest";
-import { LpdeformError, type Notice } from "lpdeform-client";
+import { LpdeformError, type Notice, type Update } from "lpdeform-client";
 import { Live } from "../src/link/live.js";
 import { addHandle, changeHandle, type Document, emptyDocument } from "../src/model/document.js";
 import { lowerText, percent, someOf } from "../src/model/words.js";
@@ -15,9 +15,12 @@ const session = vi.hoisted(() => ({
   on(name: string, listener: (notice: Notice | undefined) => void) {
     if (name === "notice") this.tell = listener;
   },
-  update() {
+  updates: [] as Update[],
+  update(update: Update) {
+    this.updates.push(update);
     return ++this.newestInput;
   },
+  solve: vi.fn<() => Promise<unknown>>(),
   poll: () => undefined,
   close: () => Promise.resolve(),
   async *[Symbol.asyncIterator]() {
@@ -33,6 +36,7 @@ vi.mock("lpdeform-client", async (original) => ({
 
 const rest = new Float32Array(9);
 const one: Document = addHandle(emptyDocument, [0], rest, { name: "tip" });
+const mesh = { name: "a", positions: rest, faces: Uint32Array.of(0, 1, 2) };
 const better: Notice = { reason: "better_shape", text: "Better.", inputSeq: 1, energy: 3, savedShare: 0.07 };
 const watcher = {
   frame: vi.fn(),
@@ -53,8 +57,7 @@ function say(notice: Notice | undefined): void {
 
 /** A document on the server, which knows a better shape for it. */
 async function told(): Promise<void> {
-  Object.assign(session, { newestInput: 0, notice: undefined });
-  const mesh = { name: "a", positions: rest, faces: Uint32Array.of(0, 1, 2) };
+  Object.assign(session, { newestInput: 0, notice: undefined, updates: [] });
   live = new Live(mesh, one, "first", "float32", watcher);
   await vi.waitFor(() => expect(session.newestInput).toBe(1));
   shares = [];
@@ -104,6 +107,37 @@ it("what the server says about itself is told once, also if it applies again aft
   session.tell(overloaded); // while the better shape is still there
   say(overloaded);
   expect(watcher.notice.mock.calls).toEqual([["Too much."]]);
+});
+
+it("how far to look is told with the next update, and again to a new session", async () => {
+  await told();
+  const solver = () => session.updates.map(({ settings }) => settings?.solver?.search);
+  expect(solver()).toEqual([undefined]); // as the server decides
+  const search = { effort: 4, leastShare: 0.05 };
+  live.lookFor(search);
+  live.lookFor(search);
+  live.show(changeHandle(one, "tip", { vertices: [0, 1] }));
+  expect(solver()).toEqual([undefined, search, undefined]);
+  live.close();
+  live = new Live(mesh, one, "first", "float32", watcher);
+  live.lookFor(search);
+  await vi.waitFor(() => expect(solver()).toEqual([undefined, search, undefined, search]));
+});
+
+it("the result for a file is that of the minimum that is shown: nothing is searched meanwhile", async () => {
+  await told();
+  live.lookFor({ effort: 4, show: true });
+  live.status = { ...live.status, kind: "live" };
+  session.solve.mockImplementation(() => {
+    expect(session.updates.at(-1)!.settings!.solver!.search).toEqual({ effort: 0, show: true });
+    return Promise.reject(new LpdeformError("unavailable", "Away."));
+  });
+  await expect(live.solve(1000)).rejects.toThrow("Away.");
+  expect(session.updates.at(-1)!.settings!.solver!.search).toEqual({ effort: 4, show: true });
+  const count = session.updates.length;
+  live.lookFor({ effort: 0 });
+  await expect(live.solve(1000)).rejects.toThrow();
+  expect(session.updates.length).toBe(count + 1);
 });
 
 it("one better shape is offered by what it saves, several by the most that one of them saves", () => {

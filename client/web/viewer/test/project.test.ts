@@ -22,6 +22,7 @@ const view = {
   pinned: 0.25,
   colourBy: "p",
   wireframe: true,
+  search: { effort: 3, show: true },
 } as const;
 const vertexCount = shape.mesh.positions.length / 3;
 
@@ -181,6 +182,8 @@ describe("a project", () => {
     ["a pose's rotation", (head) => (head["poses"][0].handles[1].pose.rotation = [2, 0, 0, 0]), "pose 1 has"],
     ["two poses of a name", (head) => head["poses"].push(head["poses"][0]), "pose 2 has no name of its own"],
     ["view", (head) => (head["view"].colourBy = "smell"), '“colourBy” of the view is "smell"'],
+    ["search", (head) => (head["view"].search = { effort: 1001 }), '“search” of the view is {"effort":1001}'],
+    ["share", (head) => (head["view"].search = { leastShare: "2" }), "“search” of the view"],
     ["shape", (head) => (head["view"].shape = "__proto__"), "“shape” of the view"],
     ["camera", (head) => (head["camera"].position = [0, 0]), "the camera has no place"],
     ["what it looks at", (head) => (head["camera"].target = head["camera"].position), "nothing to look at"],

@@ -22,7 +22,7 @@ void ULpdeformComponent::BeginPlay() {
     UE_LOG(LogTemp, Warning, TEXT("lpdeform: %s"), UTF8_TO_TCHAR(Error.what()));
     return;
   }
-  Follower->set(P, bShowBetterShapes);
+  Follower->set(P, {bShowBetterShapes, SearchEffort, LeastShare});
   for (FLpdeformHandle& Handle : Handles) Hold(Handle, Shape.positions);
   SetComponentTickEnabled(true);
 }

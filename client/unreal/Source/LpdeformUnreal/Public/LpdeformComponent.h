@@ -42,6 +42,15 @@ class LPDEFORMUNREAL_API ULpdeformComponent : public UDynamicMeshComponent {
   /** Show such a shape at once. Otherwise a line of the log says that it is known, and TakeBetterShape shows it. */
   UPROPERTY(EditAnywhere, Category = "Lpdeform")
   bool bShowBetterShapes = false;
+  /**
+   * How far the server looks for such shapes: 12 times as many starts, and none at 0. At -1 the server decides: 1 where p is below 2,
+   * otherwise 0. Counts from the next BeginPlay, as the share does.
+   */
+  UPROPERTY(EditAnywhere, Category = "Lpdeform", meta = (ClampMin = -1, ClampMax = 1000))
+  int32 SearchEffort = -1;
+  /** The share of the energy that such a shape must save; 0 is the server's own, 0.02. */
+  UPROPERTY(EditAnywhere, Category = "Lpdeform", meta = (ClampMin = 0, ClampMax = 1))
+  double LeastShare = 0.02;
   /** Write the distortion to the mesh's colours, from blue (none) to red. Counts from the next BeginPlay. */
   UPROPERTY(EditAnywhere, Category = "Lpdeform")
   bool bShowDistortion = false;

@@ -629,6 +629,7 @@ export class App implements Workbench {
     if (view.tool !== before.tool) queueMicrotask(() => this.#panes.needsFit && this.fit()); // when its options are there
     if (view.encoding !== before.encoding && this.mesh !== noMesh)
       for (const pane of this.panes) pane.open(this.mesh, this.document, view, this.#watched);
+    if (view.search !== before.search) for (const { live } of this.panes) live?.lookFor(view.search);
     if (view.isYUp !== before.isYUp) this.#fitSoon();
     this.#needsColours = this.#needsMarks = true;
     this.requestDraw();

@@ -108,6 +108,7 @@ export class Pane {
       better: () => this.watcher.better(),
     };
     this.live = new Live(mesh, document, this.side, view.encoding, watcher, weldOf(derivedOf(mesh)), watched, this.#worker);
+    this.live.lookFor(view.search);
     this.watcher.better();
     this.#isDirty = true;
   }

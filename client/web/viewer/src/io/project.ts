@@ -5,7 +5,7 @@ import { leastP, mostP } from "../model/exponent.js";
 import type { Mesh, Vector3 } from "lpdeform-client/mesh/mesh";
 import type { Pose } from "../model/pose.js";
 import { type Detail, shapeKinds } from "../model/shapes.js";
-import { type ColourBy, colourings, type View } from "../model/view.js";
+import { type ColourBy, colourings, usualSearch, type View } from "../model/view.js";
 import { FileFault } from "lpdeform-client/mesh/fault";
 import { gunzip, gzip } from "./gzip.js";
 import { isPlace } from "./places.js";
@@ -35,6 +35,7 @@ export type ProjectView = Pick<
   | "wireframe"
   | "ghost"
   | "encoding"
+  | "search"
 >;
 
 /** Work as one file: mesh, handles, fields, settings, camera. */
@@ -51,6 +52,13 @@ const oneOf =
   (value: unknown) =>
     values.includes(value as Value);
 
+function isSearch(value: unknown): boolean {
+  if (!isObject(value)) return false;
+  const { effort = 0, show = false, leastShare = 0 } = value;
+  const isEffort = Number.isInteger(effort) && (effort as number) >= 0 && (effort as number) <= 1000;
+  return isEffort && isBoolean(show) && typeof leastShare === "number" && leastShare >= 0 && leastShare <= 1;
+}
+
 /** What each may be. One that is missing does not compile. */
 const viewChecks: { readonly [K in keyof ProjectView]: (value: unknown) => boolean } = {
   shape: oneOf("", ...shapeKinds.map(({ id }) => id)),
@@ -65,6 +73,7 @@ const viewChecks: { readonly [K in keyof ProjectView]: (value: unknown) => boole
   wireframe: isBoolean,
   ghost: isBoolean,
   encoding: oneOf<Encoding>("float32", "quantized", "compressed"),
+  search: isSearch,
 };
 const viewKeys = Object.keys(viewChecks) as (keyof ProjectView)[];
 
@@ -160,7 +169,7 @@ function markOf(marks: unknown, k: number, name: string, file: string): Mark {
 /** Keys that this page does not know are those of a later one, and change nothing of the work. */
 function viewOf(json: unknown, document: Document, file: string): ProjectView {
   const { tolerance: weldTolerance } = usualWelding; // earlier pages wrote none
-  const view: Record<string, unknown> = { weldTolerance, ...(isObject(json) && json) };
+  const view: Record<string, unknown> = { weldTolerance, search: usualSearch, ...(isObject(json) && json) };
   for (const key of viewKeys) {
     if (viewChecks[key](view[key])) continue;
     throw new FileFault(`In ${file}, “${key}” of the view is ${JSON.stringify(view[key])}, which it cannot be.`);

@@ -6,16 +6,19 @@ import {
   type FrameShading,
   LpdeformError,
   type MeshReport,
+  type MinimaSearch,
   type Notice,
   openSession,
   type Session,
   type SolveResult,
   joinSession,
+  type Update,
   type Weld,
 } from "lpdeform-client";
 import { changes, exponent, newSession, type Side } from "../model/changes.js";
 import type { Document } from "../model/document.js";
 import type { Mesh } from "lpdeform-client/mesh/mesh";
+import { usualSearch } from "../model/view.js";
 import { Meter } from "./meter.js";
 import { Pulse } from "./pulse.js";
 import { failingHere, isPassing, notAnswering, say, type Status, statusAtEnd, statusOf } from "./status.js";
@@ -54,6 +57,8 @@ export class Live {
   status: Status = say("idle", "");
   #session: Session | undefined;
   #told = newSession;
+  #search = usualSearch;
+  #toldSearch = usualSearch;
   #waiting: Frame | undefined;
   #taken: (() => void) | undefined;
   #inputs: { seq: number; time: number; sent: number }[] = [];
@@ -95,6 +100,12 @@ export class Live {
   show(document: Document, time = performance.now()): void {
     this.document = document;
     this.#tell(time);
+  }
+
+  /** How far the server is to look for lower minima. */
+  lookFor(search: MinimaSearch): void {
+    this.#search = search;
+    this.#tell(performance.now());
   }
 
   /** The newest frame, to be drawn at once. */
@@ -157,13 +168,20 @@ export class Live {
   }
 
   /**
-   * The result for the document in the doubles that the server computes. Rejects if the server is away, has nothing to solve,
-   * or takes longer than `deadlineMs`.
+   * The result for the document in the doubles that the server computes: the minimum that is shown, without a search for lower ones.
+   * Rejects if the server is away, has nothing to solve, or takes longer than `deadlineMs`.
    */
   async solve(deadlineMs: number): Promise<SolveResult<Float64Array>> {
     const session = this.#session;
     if (!session || this.status.kind !== "live") throw new LpdeformError("unavailable", this.status.title);
-    return await session.solve({ scalar: "float64", deadlineMs, signal: AbortSignal.timeout(deadlineMs) });
+    const wanted = this.#search;
+    const none: MinimaSearch = { ...wanted, effort: 0 };
+    if (wanted.effort) this.lookFor(none);
+    try {
+      return await session.solve({ scalar: "float64", deadlineMs, signal: AbortSignal.timeout(deadlineMs) });
+    } finally {
+      if (this.#search === none) this.lookFor(wanted);
+    }
   }
 
   /** A shape of lower energy for the present document; undefined if none is known, or as soon as it is being taken. */
@@ -213,6 +231,7 @@ export class Live {
       if (!session) return;
       this.#session = session;
       this.#told = newSession;
+      this.#toldSearch = usualSearch;
       this.#inputs = [];
       this.#exponents = [];
       this.#sent = [];
@@ -308,10 +327,11 @@ export class Live {
 
   #tell(time: number): void {
     const session = this.#session;
-    const update = session && !this.watched && changes(this.#told, this.document, this.mesh, this.side);
+    const update = session && !this.watched && this.#news();
     if (!session || !update) return;
     const isInput = this.#told !== newSession;
     this.#told = this.document;
+    this.#toldSearch = this.#search;
     try {
       this.#newest = session.update(update);
       this.#noteExponent(this.#newest);
@@ -321,6 +341,13 @@ export class Live {
     } catch (thrown) {
       this.watcher.problem(thrown as LpdeformError);
     }
+  }
+
+  /** What the server has not been told. */
+  #news(): Update | undefined {
+    const update = changes(this.#told, this.document, this.mesh, this.side);
+    if (this.#search === this.#toldSearch) return update;
+    return { ...update, settings: { ...update?.settings, solver: { search: this.#search } } };
   }
 
   #noteExponent(seq: number): void {

@@ -1,4 +1,4 @@
-import type { Encoding } from "lpdeform-client";
+import type { Encoding, MinimaSearch } from "lpdeform-client";
 import { usualWelding } from "lpdeform-client/mesh/derived";
 import type { PaletteName } from "./palettes.js";
 import type { Snapping } from "./snap.js";
@@ -67,7 +67,12 @@ export interface View {
   detail: Detail;
   shape: string;
   encoding: Encoding;
+  /** How far the server looks for lower minima while nothing changes. */
+  search: MinimaSearch;
 }
+
+/** As the server decides. */
+export const usualSearch: MinimaSearch = {};
 
 export const firstView: View = {
   tool: "move",
@@ -102,4 +107,5 @@ export const firstView: View = {
   detail: "medium",
   shape: "",
   encoding: "quantized",
+  search: usualSearch,
 };

@@ -5,6 +5,7 @@ import { handlesPanel } from "./handles.js";
 import { lookPanel } from "./look.js";
 import { measures } from "./measures.js";
 import { posesPanel } from "./poses.js";
+import { searchPanel } from "./search.js";
 import { reportPanel, warningsOf } from "./report.js";
 
 export function sidePanel(app: App): HTMLElement {
@@ -18,6 +19,7 @@ export function sidePanel(app: App): HTMLElement {
     section("Blend through p", blendPanel(app), true),
     section("Poses", posesPanel(app), false),
     section("Look", lookPanel(app), true),
+    section("Lower minima", searchPanel(app), false),
     numbers,
     mesh,
   );

@@ -277,6 +277,27 @@ describe("p", () => {
   });
 });
 
+describe("how far to look for lower minima", () => {
+  it("is chosen in the side panel, and the server takes it", async () => {
+    const panel = user.page.locator(".panel details", { hasText: "Lower minima" });
+    await panel.locator("summary").click();
+    const chosen = () => user.ask("app.view.now.search");
+    const looks = panel.getByLabel("How far to look for lower minima");
+    await looks.selectOption({ label: "48 starts" });
+    await panel.getByLabel("How much energy a better shape must save").selectOption({ label: "5\u00a0% less energy" });
+    await panel.getByText("Show at once").click();
+    expect(await chosen()).toEqual({ effort: 4, leastShare: 0.05, show: true });
+    await user.settled();
+    expect(await user.ask("app.facts.now.problem")).toBeUndefined();
+    await user.ask("app.view.set({ search: { effort: 7 } })"); // as a project may have it
+    expect(await looks.locator("option:checked").textContent()).toBe("84 starts");
+    await looks.selectOption({ label: "as the server decides" });
+    expect(await chosen()).toEqual({});
+    await user.settled();
+    await panel.locator("summary").click();
+  });
+});
+
 describe("the look", () => {
   it("has wireframe, ghost, normals and a scale that can be pinned", async () => {
     for (const key of ["w", "g"]) {
