@@ -38,7 +38,8 @@ struct LpdeformShape {
 struct LpdeformSearch {
   /// A shape that it finds is shown at once. Otherwise LpdeformFollower::notice() says that there is one.
   bool shows = false;
-  /// 12 times as many starts, up to 1000; 0: none. Negative: the server decides, which takes 1 where p is below 2, and otherwise 0.
+  /// Each unit, of up to 1000, stands for 12 starts; at 0 there are none. Negative: the server decides, which takes 1 where p is below 2,
+  /// and otherwise 0. See lpdeform_settings.search_effort.
   int effort = -1;
   /// The share of the energy that such a shape must save, up to 1; 0 means 0.02.
   double least_share = 0;
@@ -116,7 +117,7 @@ class LpdeformFollower {
     return said(lpdeform_move_handle(session_, name, &motion, nullptr, &error_));
   }
 
-  /// p, 1 to 64, everywhere. Does not wait. False: problem() says why.
+  /// p, 1 to 64, everywhere. Does not wait. The server may refuse it later, as a whole: problem() then says why.
   bool set(double p, const LpdeformSearch& search) {
     lpdeform_settings settings{};
     settings.struct_size = sizeof settings;

@@ -18,6 +18,11 @@ using Clock = std::chrono::steady_clock;
 constexpr double kLongestSeconds = 1e6;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+/// t of the maximum in f*(y) = max_t y t - k t^p, for p > 1: |y| = k p t^{p - 1}.
+double conjugate_point(double y, double k, double p) {
+  return std::pow(y / (k * p), 1 / (p - 1));
+}
+
 /// argmin over t >= 0 of k t^p + (rho / 2) (t - v)^2.
 double shrink(double v, double k, double p, double rho) {
   if (p == 1) return std::max(0.0, v - k / rho);
@@ -44,28 +49,26 @@ class DualBound {
   /// max over theta >= 0 of D(theta y), for y with A^T y = 0.
   double scaled_bound(const EdgeVectors& y) {
     conjugates_.assign(step_.count(), 0);
-    largest_ = 0;
+    near_one_.clear();
     double longest_theta = 2;
     for (std::int32_t i = 0; i < step_.count(); ++i) {
       const double norm = step_.norm(y, i);
-      if (p(i) > 1)
-        largest_ = std::max(largest_, ratio(norm, i));
-      else if (norm > 0)
+      if (norm == 0) continue;
+      if (p(i) >= kNearOne)
+        conjugates_[i] = norm * conjugate_point(norm, k(i), p(i));
+      else if (p(i) > 1)
+        near_one_.push_back({norm, norm / (k(i) * p(i)), 1 / (p(i) - 1)});
+      else
         longest_theta = std::min(longest_theta, k(i) / norm);
     }
-    if (largest_ == 0) largest_ = 1;
-    for (std::int32_t i = 0; i < step_.count(); ++i) {
-      const double norm = step_.norm(y, i);
-      if (p(i) > 1 && norm > 0) conjugates_[i] = norm * std::pow(ratio(norm, i) / largest_, 1 / (p(i) - 1));
-    }
     inner_ = y.cwiseProduct(z_).sum();
-    double low = 0, high = longest_theta * largest_;
+    double low = 0, high = longest_theta;
     for (int step = 0; step < 60; ++step) {
-      const double tau = step == 0 ? high : 0.5 * (low + high);
-      if (slope(tau) >= 0)
-        low = tau;
+      const double theta = step == 0 ? high : 0.5 * (low + high);
+      if (slope(theta) >= 0)
+        low = theta;
       else
-        high = tau;
+        high = theta;
       if (low == high) break;
     }
     return value(low);
@@ -75,33 +78,40 @@ class DualBound {
   double k(std::int32_t i) const { return step_.coefficient(i); }
 
  private:
-  double ratio(double norm, std::int32_t i) const { return norm / (k(i) * p(i)); }
+  /// Powers of 1 / (p_i - 1) of theta and of |y_i| / (k_i p_i) would overflow one by one; of their product they do not where it matters.
+  struct NearOne {
+    double norm;      // |y_i|
+    double ratio;     // |y_i| / (k_i p_i)
+    double exponent;  // 1 / (p_i - 1)
+  };
+  static constexpr double kNearOne = 1.05;
 
-  // f_i*(y) = max_t |y| t - k t^p has its maximum where t^{p - 1} is the ratio. With theta = tau / largest_,
-  // f_i*(theta y_i) = (1 - 1/p_i) theta tau^{1 / (p_i - 1)} conjugates_[i]. The powers of the ratios themselves would overflow near p = 1.
-  double slope(double tau) const {
+  // f_i*(theta y_i) = (1 - 1/p_i) theta^{p_i / (p_i - 1)} |y_i| t_i, where t_i is the conjugate point of |y_i|.
+  double slope(double theta) const {
     double sum = inner_, power = 0, of_p = 0;
     for (std::int32_t i = 0; i < step_.count(); ++i) {
       if (conjugates_[i] == 0) continue;
-      if (p(i) != of_p) of_p = p(i), power = std::pow(tau, 1 / (of_p - 1));
+      if (p(i) != of_p) of_p = p(i), power = std::pow(theta, 1 / (of_p - 1));
       sum -= power * conjugates_[i];
     }
+    for (const NearOne& term : near_one_) sum -= term.norm * std::pow(theta * term.ratio, term.exponent);
     return sum;
   }
-  double value(double tau) const {
-    const double theta = tau / largest_;
+  double value(double theta) const {
     double sum = theta * inner_;
     for (std::int32_t i = 0; i < step_.count(); ++i) {
       if (conjugates_[i] == 0) continue;
-      sum -= (1 - 1 / p(i)) * theta * std::pow(tau, 1 / (p(i) - 1)) * conjugates_[i];
+      sum -= (1 - 1 / p(i)) * std::pow(theta, p(i) / (p(i) - 1)) * conjugates_[i];
     }
+    for (const NearOne& term : near_one_)
+      sum -= theta * term.norm * std::pow(theta * term.ratio, term.exponent) / (term.exponent + 1);
     return std::isfinite(sum) ? sum : -kInfinity;
   }
 
   const ConvexRows& step_;
   const EdgeVectors& z_;
-  std::vector<double> conjugates_;  // |y_i| (ratio / largest_)^{1 / (p_i - 1)}
-  double largest_ = 1;              // of the ratios |y_i| / (k_i p_i)
+  std::vector<double> conjugates_;  // |y_i| t_i; 0 where p_i is below kNearOne
+  std::vector<NearOne> near_one_;   // of 1 < p_i < kNearOne
   double inner_ = 0;
 };
 

@@ -39,10 +39,10 @@ absl::Status too_many(const std::vector<LinearRow>& rows) {
   return make_fault(
       {Reason::kTooManyLocks, absl::StrCat("handle \"", owner, "\""),
        absl::StrCat("equations <= ", LinearConstraints::kMostRows)},
-      absl::StrCat("points inside faces and locks make ", rows.size(), " equations, most of them handle \"",
-                   owner, "\" (", most,
-                   "): 3 a point, 2 a vertex locked to an axis, 1 a vertex locked to a plane; there may be ",
-                   LinearConstraints::kMostRows));
+      absl::StrCat("points inside faces and locks make ", rows.size(),
+                   " equations, 3 a point, 2 a vertex locked to an axis, 1 a vertex "
+                   "locked to a plane; handle \"",
+                   owner, "\" makes the most, ", most, "; there may be ", LinearConstraints::kMostRows));
 }
 
 }  // namespace

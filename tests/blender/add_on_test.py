@@ -505,6 +505,24 @@ class AddOn(unittest.TestCase):
         self.assertEqual(bpy.ops.lpdeform.solve(), {"FINISHED"})
         self.assertEqual(running.result.effort, 0)
 
+    def test_a_better_shape_takes_the_place_of_a_solved_one_and_other_frames_for_its_input_do_not(self):
+        self.held()
+        stage.settle(self.tube)
+        running = live.of(self.tube)
+        self.assertEqual(bpy.ops.lpdeform.solve(), {"FINISHED"})
+        solved = running.result
+
+        def take(energy: float):
+            shown = dict(positions=solved.positions, distortion=solved.distortion, optimality_gap=None)
+            frame = types.SimpleNamespace(input_seq=solved.input_seq, energy=energy, **shown)
+            running._take(self.tube, lambda: frame)
+            return frame
+
+        take(solved.energy)
+        self.assertIs(running.shown, solved)
+        better = take(0.9 * solved.energy)
+        self.assertIs(running.shown, better)
+
     def test_p_by_shape_a_region_and_a_bound(self):
         self.tube.lpdeform.certify = True
         _, tip = self.held()

@@ -164,7 +164,7 @@ class LiveMesh:
         if frame is not None and frame is not self.frame:
             self._told.answered(frame.input_seq)
             self.frame = frame
-            if self.result is None or frame.input_seq > self.result.input_seq:
+            if self.result is None or _is_past(self.result, frame):
                 self.result = None
                 self.show(ob)
         return frame
@@ -297,6 +297,12 @@ class LiveMesh:
             self._is_touched = False
         if not self._is_touched:
             self._operator = operator
+
+
+def _is_past(result, frame) -> bool:
+    """Whether the frame is of a newer input than the result of a solve, or of a better shape, which comes for the same input."""
+    is_better = frame.input_seq == result.input_seq and frame.energy < result.energy * (1 - 1e-9)
+    return frame.input_seq > result.input_seq or is_better
 
 
 def _newest_operator() -> int:

@@ -52,12 +52,12 @@ class MeshSettings(bpy.types.PropertyGroup):
     )
     search_effort: IntProperty(
         name="Search", default=-1, min=-1, max=1000, soft_max=16,
-        description="How far the server looks for shapes of lower energy, while nothing changes and in Solve: 12 times as many "
-        "starts, and none at 0. At -1 the server decides: 1 where p is below 2, otherwise 0",
+        description="How far the server looks for shapes of lower energy, while nothing changes and in Solve. Each unit stands for 12 "
+        "starts; at 0 there are none. At -1 the server decides: 1 while nothing changes if p is below 2, otherwise 0",
     )  # fmt: skip
     search_percent: FloatProperty(
-        name="Tell from", default=2.0, min=0.0, max=100.0, subtype="PERCENTAGE",
-        description="The share of the energy that such a shape must save while nothing changes; 0: the server's own, 2 %",
+        name="Least saving", default=2.0, min=0.0, max=100.0, subtype="PERCENTAGE",
+        description="The share of the energy that such a shape must save to be announced or shown; 0: the server's own, 2 %",
     )  # fmt: skip
     search_shows: BoolProperty(name="Show at once", default=False, description="Shows such a shape as soon as the server has found it")
     show_distortion: BoolProperty(

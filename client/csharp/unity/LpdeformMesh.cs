@@ -30,8 +30,8 @@ public sealed class LpdeformMesh : MonoBehaviour
     /// A shape of lower energy that the server finds while nothing moves is shown at once. Otherwise the log says that there is
     /// one, and "Take the better shape" in the component's menu shows it.
     public bool showBetterShapes;
-    /// How far the server looks for such shapes while nothing moves: 12 times as many starts, and none at 0. At -1 the server decides:
-    /// 1 where p is below 2, otherwise 0.
+    /// How far the server looks for such shapes while nothing moves. Each unit stands for 12 starts; at 0 there are none. At -1 the
+    /// server decides: 1 where p is below 2, otherwise 0.
     [Range(-1, 1000)] public int searchEffort = -1;
     /// The share of the energy that such a shape must save; 0 is the server's own, 0.02.
     [Range(0, 1)] public float leastShare = 0.02f;
@@ -135,10 +135,10 @@ public sealed class LpdeformMesh : MonoBehaviour
         {
             foreach (var handle in handles)
                 if (handle.holds) Send(handle);
-            if (p != sentP)
+            if (!p.Equals(sentP))
             {
+                sentP = p;  // also if it is refused: that is said once
                 session.Set(p: p);
-                sentP = p;
             }
             var search = new MinimaSearch
             {
@@ -146,7 +146,7 @@ public sealed class LpdeformMesh : MonoBehaviour
             };
             if (sentSearch == null || !Same(search, sentSearch.Value))
             {
-                sentSearch = search;  // also if it is refused: that is said once
+                sentSearch = search;
                 session.SetSolver(new SolverSettings { Search = search });
             }
             Frame frame;
@@ -218,7 +218,7 @@ public sealed class LpdeformMesh : MonoBehaviour
 
     static bool Same(MinimaSearch a, MinimaSearch b)
     {
-        return a.Show == b.Show && a.Effort == b.Effort && a.LeastShare == b.LeastShare;
+        return a.Show == b.Show && a.Effort == b.Effort && a.LeastShare.Equals(b.LeastShare);
     }
 
     /// Without the allocation of Equals(object).

@@ -76,6 +76,34 @@ TEST_F(CertificateTest, IsTightWherePIsBarelyAboveOne) {
   }
 }
 
+/// Soft terms have at least p = 2, and cells that are stretched past an edge have far larger forces at a large p.
+TEST_F(CertificateTest, ClaimsNothingWherePIsBarelyAboveOneBesideLargerExponents) {
+  const auto gap = [&](const Material& material) {
+    HandleSet soft = handles;
+    EXPECT_TRUE(
+        soft.set("middle", {slice(bar, 2, 10, 10), RigidMotion{.translation = {0, 6, 0}}, Soft{0.05}}).ok());
+    const Constraints held = make_constraints(*shape, soft, FreeComponents::kError).value();
+    auto solver = deformer(shape, soft, material);
+    SolveSettings settings;
+    settings.initial = InitialGuess::kLaplacian;
+    settings.max_iterations = 5;
+    settings.certify = true;
+    settings.effort = 0;
+    return solver->solve(settings).value().optimality_gap.value();
+  };
+  const double at_one = gap(Material::uniform(1));
+  EXPECT_GT(at_one, 0.01);
+  for (const double p : {1 + 1e-9, 1 + 1e-6, 1 + 1e-4})
+    EXPECT_NEAR(gap(Material::uniform(p)), at_one, 0.2 * at_one) << "p = 1 + " << p - 1;
+  for (const double high : {2.0, 6.0, 64.0}) {
+    Material material = Material::uniform(1.001);
+    material.p.resize(shape->vertex_count());
+    for (std::int32_t i = 0; i < shape->vertex_count(); ++i)
+      material.p[i] = bar.vertices(i, 2) > 17 ? high : 1.001;
+    EXPECT_GT(gap(material), 1e-3) << high;
+  }
+}
+
 TEST_F(CertificateTest, IsTightWithStiffnessThatVariesByMillions) {
   for (const double p : {1.0, 2.0, 6.0}) {
     const Material material = of_varying_stiffness(p);

@@ -53,8 +53,8 @@ signal failed(text: String)
 		show_better_shapes = value
 		_set_p()
 
-## How far the server looks for such shapes while nothing changes: 12 times as many starts, and none at 0. At -1 the server decides:
-## 1 where p is below 2, otherwise 0.
+## How far the server looks for such shapes while nothing changes. Each unit stands for 12 starts; at 0 there are none. At -1 the server
+## decides: 1 where p is below 2, otherwise 0.
 @export_range(-1, 1000) var search_effort := -1:
 	set(value):
 		search_effort = value

@@ -143,6 +143,7 @@ describe("a project", () => {
 
   it("of a view with keys of a later page is opened", async () => {
     expect((await read(await altered(({ view }) => (view.light = "matcap")))).view.shape).toBe("bar");
+    expect((await read(await altered(({ view }) => (view.search.depth = 2)))).view.search).toEqual(view.search);
   });
 
   it("that is another file, cut off or changed is refused", async () => {

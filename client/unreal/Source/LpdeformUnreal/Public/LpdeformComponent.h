@@ -43,8 +43,8 @@ class LPDEFORMUNREAL_API ULpdeformComponent : public UDynamicMeshComponent {
   UPROPERTY(EditAnywhere, Category = "Lpdeform")
   bool bShowBetterShapes = false;
   /**
-   * How far the server looks for such shapes: 12 times as many starts, and none at 0. At -1 the server decides: 1 where p is below 2,
-   * otherwise 0. Counts from the next BeginPlay, as the share does.
+   * How far the server looks for such shapes while nothing changes. Each unit stands for 12 starts; at 0 there are none. At -1 the server
+   * decides: 1 where p is below 2, otherwise 0. Counts from the next BeginPlay, as the share does.
    */
   UPROPERTY(EditAnywhere, Category = "Lpdeform", meta = (ClampMin = -1, ClampMax = 1000))
   int32 SearchEffort = -1;

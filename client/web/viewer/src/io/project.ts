@@ -175,7 +175,9 @@ function viewOf(json: unknown, document: Document, file: string): ProjectView {
     throw new FileFault(`In ${file}, “${key}” of the view is ${JSON.stringify(view[key])}, which it cannot be.`);
   }
   const known = Object.fromEntries(viewKeys.map((key) => [key, view[key]])) as unknown as ProjectView;
-  return { ...known, selected: handleOf(document, known.selected)?.name };
+  const { effort, show, leastShare } = known.search;
+  const search = { ...(effort !== undefined && { effort }), ...(show && { show }), ...(leastShare && { leastShare }) };
+  return { ...known, search, selected: handleOf(document, known.selected)?.name };
 }
 
 function lookOf(json: unknown, file: string): Project["look"] {

@@ -168,7 +168,7 @@ export class Live {
   }
 
   /**
-   * The result for the document in the doubles that the server computes: the minimum that is shown, without a search for lower ones.
+   * The result for the document in the doubles that the server computes: the minimum that is shown, from which the server does not search.
    * Rejects if the server is away, has nothing to solve, or takes longer than `deadlineMs`.
    */
   async solve(deadlineMs: number): Promise<SolveResult<Float64Array>> {

@@ -14,7 +14,7 @@ export function searchPanel(app: App): HTMLElement {
   const about = el(
     "p",
     { className: "quiet" },
-    "Below p = 2 a pose has many minima. While nothing changes, the server looks for a lower one than is shown.",
+    "Below p = 2 a pose has many minima. While nothing changes, the server looks for lower ones than the one that is shown. The starts chosen here follow one another. After them come more with pauses, up to 72 in all.",
   );
   const change = (part: MinimaSearch) => app.view.set({ search: { ...app.view.now.search, ...part } });
   const starts = select("How far to look for lower minima", ["", "as the server decides"]);
@@ -27,7 +27,7 @@ export function searchPanel(app: App): HTMLElement {
     app.view.set({ search: starts.value === "" ? others : { ...others, effort: Number(starts.value) } });
   });
   const least = select("How much energy a better shape must save");
-  const offerShare = (share: number) => offer(least, share, `${percent(share)} less energy`);
+  const offerShare = (share: number) => offer(least, share, `at least ${percent(share)}`);
   for (const share of shares) offerShare(share);
   least.addEventListener("change", () => change({ leastShare: Number(least.value) }));
   const show = toggle("Show at once", false, (isOn) => change({ show: isOn }), "Otherwise a button offers a better shape");
@@ -47,7 +47,7 @@ export function searchPanel(app: App): HTMLElement {
     {},
     about,
     el("label", { className: "pair" }, el("span", {}, "Search"), starts),
-    el("label", { className: "pair" }, el("span", {}, "At least"), least),
+    el("label", { className: "pair" }, el("span", {}, "Saving"), least),
     show.element,
   );
 }
