@@ -26,7 +26,7 @@ export function searchPanel(app: App): HTMLElement {
     const { effort: _, ...others } = app.view.now.search;
     app.view.set({ search: starts.value === "" ? others : { ...others, effort: Number(starts.value) } });
   });
-  const least = select("How much energy a better shape must save");
+  const least = select("Least saving of energy");
   const offerShare = (share: number) => offer(least, share, `at least ${percent(share)}`);
   for (const share of shares) offerShare(share);
   least.addEventListener("change", () => change({ leastShare: Number(least.value) }));

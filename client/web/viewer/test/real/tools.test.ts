@@ -284,7 +284,7 @@ describe("how far to look for lower minima", () => {
     const chosen = () => user.ask("app.view.now.search");
     const looks = panel.getByLabel("How far to look for lower minima");
     await looks.selectOption({ label: "48 starts" });
-    await panel.getByLabel("How much energy a better shape must save").selectOption({ label: "at least 5\u00a0%" });
+    await panel.getByLabel("Least saving of energy").selectOption({ label: "at least 5\u00a0%" });
     await panel.getByText("Show at once").click();
     expect(await chosen()).toEqual({ effort: 4, leastShare: 0.05, show: true });
     await user.settled();
