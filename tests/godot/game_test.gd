@@ -160,7 +160,7 @@ func lets_go() -> void:
 	var scene := open_sample()
 	var bar := bar_of(scene)
 	var head: LpdeformHandle = bar.get_node("Head")
-	await process_frame
+	await until(func() -> bool: return bar.mesh != null, "the session begins")
 	head.position.y += 0.5
 	var height := func() -> float:
 		var most := -INF
