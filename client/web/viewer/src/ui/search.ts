@@ -14,7 +14,7 @@ export function searchPanel(app: App): HTMLElement {
   const about = el(
     "p",
     { className: "quiet" },
-    "Below p = 2 a pose has many minima. While nothing changes, the server looks for lower ones than the one that is shown. The starts chosen here follow one another. After them come more with pauses, up to 72 in all.",
+    "Below p = 2 a pose has many minima. While nothing changes, the server looks for lower ones than the one that is shown. The starts chosen here follow one another. A mesh of up to 15,000 vertices may get more after them, with pauses.",
   );
   const change = (part: MinimaSearch) => app.view.set({ search: { ...app.view.now.search, ...part } });
   const starts = select("How far to look for lower minima", ["", "as the server decides"]);
